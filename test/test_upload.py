@@ -77,6 +77,19 @@ def test_the_page_is_at_its_secret_address_on_this_machine_only(server):
     assert nonce not in again['Content-Security-Policy']
 
 
+def test_a_place_is_skipped_before_the_answer_tells_another(folder, verdicts):
+    now = [Progress(['Next: half a turn.'])]
+    served = UploadServer(folder, lambda: now[0], verdicts, skip=lambda seconds: now.__setitem__(
+        0, Progress([f'Next: a quarter of a turn, told within {seconds:.0f} s.'])))
+    try:
+        status, _, body = ask(served, 'POST', f'/{served.token}/skip')
+        assert (status, json.loads(body)['lines']) == (
+            200, ['Next: a quarter of a turn, told within 60 s.'])
+        assert ask(served, 'POST', '/skip')[0] == ask(served, 'GET', f'/{served.token}/skip')[0]
+    finally:
+        served.close()
+
+
 def test_every_run_has_another_address(server, folder, verdicts):
     other = UploadServer(folder, Progress, verdicts)
     try:

@@ -373,6 +373,56 @@ def test_the_loop_takes_photos_in_says_where_to_stand_and_has_a_result(posed, tm
     assert '9.jpg: gone from the folder' in said
 
 
+def place_of(shape, goal):
+    """Return where a goal stands in the world of the photos' cameras."""
+    return (shape.world_from_object @ (*goal.camera.position, 1.0))[:3]
+
+
+def test_a_place_that_is_skipped_is_told_no_more_also_after_further_photos(
+        posed, tmp_path, adviser):
+    said = []
+    watcher = Watcher(tmp_path, Collection(posed / 'transforms.json', Options()), adviser,
+                      said.append)
+    watcher.skip()  # none is told yet
+    for number in range(3):
+        shutil.copy(posed / f'photo{number}.png', tmp_path)
+    for second in range(6):
+        watcher.step(float(second))
+    first = place_of(watcher.progress.shape, watcher.progress.advice.goal)
+    watcher.skip()
+    watcher.skip()  # pressed twice
+    assert watcher.step(6.0) and watcher.step(6.0) and not watcher.step(6.0)
+    assert said.count('left out: that place; another one is looked for') == 1
+    instead = watcher.progress
+    shutil.copy(posed / 'photo3.png', tmp_path)
+    watcher.step(7.0)
+    assert watcher.step(8.0) and len(watcher.progress.shape.views) == 4
+    for now in (instead, watcher.progress):
+        away = place_of(now.shape, now.advice.goal) - first
+        assert np.linalg.norm(away) > 0.4 * np.linalg.norm(first - now.shape.cube.centre)
+
+
+def test_where_all_places_are_skipped_there_are_enough_photos(shape, adviser):
+    skipped, advice = [], adviser.advice(shape)
+    while advice.goal is not None:
+        skipped.append(place_of(shape, advice.goal))
+        advice = adviser.advice(shape, skipped)
+    assert 5 < len(skipped) < 30
+    assert told(shape, advice, True)[0] == 'Enough photos: there is no place left.'
+
+
+def test_the_button_that_skips_a_place_waits_for_one(shape, adviser):
+    page = WatchPage(0, '')
+    try:
+        button = page._page._buttons['Nobody can stand there']
+        for progress in (Progress(), Progress(shape=shape, advice=adviser.advice(shape))):
+            page.draw(progress)
+            assert button.disabled != progress.has_goal
+        assert not button.disabled and not page.skips()
+    finally:
+        page.close()
+
+
 def test_photos_are_used_once_a_file_of_cameras_has_theirs(posed, tmp_path, adviser):
     said, whole, photos = [], (posed / 'transforms.json').read_text(), tmp_path / 'photos'
     photos.mkdir()

@@ -42,7 +42,8 @@ def watch_photos(folder: Path, source: 'Source | None', options: 'Options',
     host = lan_address() if pages.lan else HOST
     watcher = Watcher(folder, Collection(source, options),
                       Adviser(stopping, options.model, options.threads), typer.echo)
-    upload = UploadServer(folder, lambda: watcher.progress, watcher.verdicts, host)
+    upload = UploadServer(folder, lambda: watcher.progress, watcher.verdicts, host,
+                          skip=watcher.skip)
     try:
         page = WatchPage(pages.port, upload.url if pages.lan else '')
         try:
@@ -53,6 +54,8 @@ def watch_photos(folder: Path, source: 'Source | None', options: 'Options',
             with suppress(KeyboardInterrupt), held_interrupts() as raise_if_asked:
                 while True:
                     raise_if_asked()
+                    if page.skips():
+                        watcher.skip()
                     watcher.step(time.monotonic())
                     page.draw(watcher.progress)
                     time.sleep(1 / UPDATES_PER_S)

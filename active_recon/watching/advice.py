@@ -1,12 +1,14 @@
 """Where the next photo of a shape should be taken from, and whether there are enough."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 import math
 from pathlib import Path
 
 from active_recon.acquisition.goals import Goal
 from active_recon.errors import ConfigError
+from active_recon.geometry.cameras import Camera, orbit_camera
+from active_recon.geometry.view_distance import view_distance
 from active_recon.models.weights_files import DEFAULT_MODEL, find_weights
 from active_recon.photos.shape import Shape
 from active_recon.planner import Planner
@@ -15,9 +17,11 @@ from active_recon.policies.reasons import GoalReason
 from active_recon.policies.stopping import StoppingRule
 from active_recon.quality.tables import tables_path
 import numpy as np
+from numpy.typing import NDArray
 
 ELEVATIONS = (math.radians(20), math.radians(60))
 """Between which photos are asked for, radians: from lower, a board can hardly be read."""
+_AROUND = math.radians(25)  # who cannot stand somewhere cannot stand right beside it
 ENOUGH: Mapping[str, str] = {
     'target_reached': 'the quality that was asked for is promised',
     'max_views': 'there are as many photos as were planned',
@@ -60,11 +64,12 @@ class Adviser:
         self._policy = load_policy(AUTO_POLICY, PolicyOptions(
             views=stopping.max_views, weights=weights, threads=threads))
 
-    def advice(self, shape: Shape) -> Advice:
+    def advice(self, shape: Shape, skipped: Sequence[NDArray[np.float64]] = ()) -> Advice:
         """
         Return the advice after all photos of a shape.
 
-        Candidates stand on a dome as far away as the photos were, by their median.
+        Candidates stand on a dome as far away as the photos were, by their median. Those around
+        the places `skipped`, (3,) each in the world of the photos' cameras, are left out.
         """
         rule = self._stopping
         planner = Planner(
@@ -77,4 +82,15 @@ class Adviser:
             known = view.known
             done = planner.add_view(known.latent, view.camera, known.grid.entropy(), known.grid,
                                     known.quality).reason
+        for camera in (_camera_at(place, shape) for place in skipped):
+            goal = planner.next_goal().goal
+            for each in [] if goal is None else goal.candidates:
+                if view_distance(each, camera) < _AROUND:
+                    done = planner.give_up(each).reason or done
         return Advice(planner.next_goal().goal, planner.reason(), done)
+
+
+def _camera_at(place: NDArray[np.float64], shape: Shape) -> Camera:
+    """Return a camera at a place of the photos' world, in the object frame."""
+    x, y, z, _ = np.linalg.inv(shape.world_from_object) @ (*place, 1.0)
+    return orbit_camera(math.atan2(y, x), math.atan2(z, math.hypot(x, y)), math.hypot(x, y, z))

@@ -49,14 +49,16 @@ class UploadServer(ThreadingHTTPServer):
     A page on which photos are uploaded, in a thread of its own; `url` is its address.
 
     `folder` gets the photos, under names of the server's own. `progress` is asked for what is
-    known, `verdicts` for what became of a photo. `host` is an address of this machine; port 0:
-    any. Raises ConfigError where it cannot be served there.
+    known, `verdicts` for what became of a photo; `skip` asks for another place, and waits for it
+    at most so many seconds. `host` is an address of this machine; port 0: any. Raises ConfigError
+    where it cannot be served there.
     """
 
     daemon_threads = True
 
     def __init__(self, folder: Path, progress: Callable[[], Progress], verdicts: Verdicts,
-                 host: str = HOST, port: int = 0) -> None:
+                 host: str = HOST, port: int = 0,
+                 skip: Callable[[float], None] = lambda seconds: None) -> None:
         try:
             super().__init__((host, port), _Handler)
         except OSError as error:
@@ -64,7 +66,7 @@ class UploadServer(ThreadingHTTPServer):
                               f'{error.strerror}') from error
         self.token = secrets.token_urlsafe(16)
         self.url = f'http://{host}:{self.server_address[1]}/{self.token}/'
-        self.progress, self.verdicts = progress, verdicts
+        self.progress, self.verdicts, self.skip = progress, verdicts, skip
         self.open_uploads = threading.BoundedSemaphore(_AT_ONCE)
         self._connections = threading.BoundedSemaphore(_MOST_CONNECTIONS)
         self._folder = folder
@@ -173,9 +175,14 @@ class _Handler(BaseHTTPRequestHandler):
             self._tell(HTTPStatus.NOT_FOUND, {'verdict': 'nothing here'})
 
     def do_POST(self) -> None:
-        """Take a photo in, and answer with what became of it and where to stand next."""
+        """Take a photo in, or skip a place; answer with what became of it and where to stand."""
         self.close_connection = True
-        if self._place() != 'photo':
+        place = self._place()
+        if place == 'skip':
+            self.server.skip(_ANSWER_S)
+            self._tell(HTTPStatus.OK, _known(self.server.progress()))
+            return
+        if place != 'photo':
             self._tell(HTTPStatus.NOT_FOUND, {'verdict': 'nothing here'})
             return
         length = self.headers.get('Content-Length', '')
@@ -259,9 +266,9 @@ class _Handler(BaseHTTPRequestHandler):
 
 
 def _known(progress: Progress) -> dict[str, Any]:
-    """Return the progress for the page: lines, and the sketch as a data URL, or None."""
+    """Return the progress for the page: lines, sketch (a data URL or None), if there is a goal."""
     drawn = None
     if progress.sketch is not None:
         _, png = cv2.imencode('.png', progress.sketch[..., ::-1])
         drawn = f'data:image/png;base64,{base64.b64encode(png.tobytes()).decode()}'
-    return {'lines': list(progress.lines), 'sketch': drawn}
+    return {'lines': list(progress.lines), 'sketch': drawn, 'goal': progress.has_goal}

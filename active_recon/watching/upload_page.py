@@ -17,12 +17,15 @@ img { background: #fcfcfc; border-radius: .6rem; display: block; margin: 1rem au
       max-width: 100%; }
 #verdict { min-height: 1.5em; }
 #lines p:first-child { font-weight: 600; }
+button { background: none; border: 1px solid; border-radius: .6rem; color: inherit; display: block;
+         font: inherit; margin: 1rem auto; padding: .6rem 1rem; }
 [hidden] { display: none; }
 </style>
 <label>Take a photo<input id="photo" type="file" accept="image/*" capture="environment"></label>
 <p id="verdict" role="status"></p>
 <div id="lines"></div>
 <img id="sketch" alt="From above: the board, the photos taken, and in yellow the next one" hidden>
+<button id="skip" hidden>I cannot stand there</button>
 <script nonce="NONCE">
 const field = (name) => document.getElementById(name);
 const say = (words) => { field('verdict').textContent = words; };
@@ -38,6 +41,7 @@ const show = (state) => {
   }));
   field('sketch').hidden = !state.sketch;
   if (state.sketch) field('sketch').src = state.sketch;
+  field('skip').hidden = !state.goal;
 };
 field('photo').addEventListener('change', async () => {
   const file = field('photo').files[0];
@@ -54,10 +58,24 @@ field('photo').addEventListener('change', async () => {
     const answer = await fetch('photo', {method: 'POST', body: file});
     const told = await answer.json();
     say(told.verdict);
-    if (told.lines) show({lines: told.lines, sketch: told.sketch});
+    if (told.lines) show({lines: told.lines, sketch: told.sketch, goal: told.goal});
   } catch (error) {
     say('Not sent: is the computer still in this network?');
   }
+  busy = false;
+});
+field('skip').addEventListener('click', async () => {
+  busy = true;
+  away = false;
+  field('skip').disabled = true;
+  say('Looking for another place …');
+  try {
+    show(await (await fetch('skip', {method: 'POST'})).json());
+    say('');
+  } catch (error) {
+    say('Not sent: is the computer still in this network?');
+  }
+  field('skip').disabled = false;
   busy = false;
 });
 const look = async () => {

@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+_SKIP = 'Nobody can stand there'
 _QUIET = 2  # modules of white around the code
 _MODULE = 6  # pixels
 
@@ -63,10 +64,16 @@ class WatchPage:
         self._page = Page('active_recon, photos', 1.0, port, has_front=False)
         self.url = self._page.url
         self._page.offer_colors()
+        self._page.add_button(_SKIP, 'Ask for the next best place instead.')
+        self._page.enable(_SKIP, False)
         self._invitation = qr_code(upload_url) if upload_url else None
         self._shown: Progress | None = None
         self._state = LoopState()
         self._colored: Shape | None = None
+
+    def skips(self) -> bool:
+        """Return whether the place that is told was to be skipped since the last call."""
+        return bool(self._page.clicks())
 
     def draw(self, progress: Progress) -> None:
         """Show the progress; only what has changed is sent."""
@@ -81,6 +88,7 @@ class WatchPage:
     def _show(self, progress: Progress) -> None:
         before = None if self._shown is None else self._shown.shape
         self._shown = progress
+        self._page.enable(_SKIP, progress.has_goal)
         invited = progress.sketch is None and self._invitation is not None
         self._page.set_text([
             *progress.lines,

@@ -1,5 +1,6 @@
 """The loop over photos that arrive: each is taken in, and it is told where the next one stands."""
 
+from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -33,6 +34,11 @@ class Progress:
     sketch: NDArray[np.uint8] | None = None
 
     @property
+    def has_goal(self) -> bool:
+        """Whether a place is told, which may be skipped."""
+        return self.advice is not None and self.advice.goal is not None
+
+    @property
     def enough(self) -> bool:
         """Whether there are photos enough."""
         return self.advice is not None and bool(self.advice.done)
@@ -58,12 +64,20 @@ class Verdicts:
             return self._known.get(name)
 
 
+@dataclass(frozen=True, eq=False)
+class _Skip:
+    """That the place which was told is to be left out, and whether that is done."""
+
+    told: Progress
+    done: threading.Event = field(default_factory=threading.Event)
+
+
 class Watcher:
     """
     Takes photos in as they arrive in a folder; call `step` repeatedly, from one thread.
 
     `say` gets what happened, line by line. Other threads may read `progress`, which is replaced
-    and never changed, and wait for `verdicts`.
+    and never changed, wait for `verdicts`, and `skip`.
     """
 
     def __init__(self, folder: Path, collection: Collection, adviser: Adviser,
@@ -76,8 +90,20 @@ class Watcher:
         self._left_out: dict[str, str] = {}
         self._away = ''
         self._cameras: tuple[Files, float] = {}, 0.0
+        self._skips: deque[_Skip] = deque()
+        self._skipped: list[NDArray[np.float64]] = []  # places in the world of the cameras
         self.progress = Progress()
         self.verdicts = Verdicts()
+
+    def skip(self, seconds: float = 0.0) -> None:
+        """
+        Ask for another place than the one that is told now, for good, as nobody can stand there.
+
+        Done by the next `step`, for which another thread may wait, at most so many seconds.
+        """
+        asked = _Skip(self.progress)
+        self._skips.append(asked)
+        asked.done.wait(seconds)
 
     def step(self, now: float) -> bool:
         """
@@ -85,6 +111,9 @@ class Watcher:
 
         `now` is any clock in seconds.
         """
+        if self._skips:
+            self._leave_out(self._skips.popleft())
+            return True
         gone = self._arrivals.gone()
         for path in gone:
             self._left_out.pop(path.name, None)
@@ -102,6 +131,7 @@ class Watcher:
         if not self._queue or self._away:
             changed = self._have_cameras_changed(now)
             if changed:
+                self._skipped.clear()  # they may stand in another world
                 wrong = self._collection.read_cameras_again()
                 self._say('the cameras have changed'
                           + (f', and are not used: {wrong}' if wrong else ''))
@@ -118,6 +148,16 @@ class Watcher:
         self._tell()
         self.verdicts.put(path.name, left_out)
         return True
+
+    def _leave_out(self, asked: '_Skip') -> None:
+        """Leave out a place that was told, unless another one is told meanwhile."""
+        shape, advice = asked.told.shape, asked.told.advice
+        if asked.told is self.progress and shape and advice and advice.goal:
+            place = shape.world_from_object @ (*advice.goal.camera.position, 1.0)
+            self._skipped.append(place[:3])
+            self._say('left out: that place; another one is looked for')
+            self._tell()
+        asked.done.set()
 
     def _have_cameras_changed(self, now: float) -> bool:
         """Return whether there are other cameras than those of the shape, in whole files."""
@@ -151,7 +191,7 @@ class Watcher:
             self.progress = Progress([f'{waiting[0].upper()}{waiting[1:]}.', *out])
             self._say(self.progress.lines[0])
             return
-        advice = self._adviser.advice(shape)
+        advice = self._adviser.advice(shape, self._skipped)
         lines = told(shape, advice, self._collection.metric)
         for line in lines[:2]:
             self._say(line)

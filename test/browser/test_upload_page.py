@@ -2,6 +2,9 @@
 
 import threading
 
+from active_recon.acquisition.goals import Goal
+from active_recon.geometry.cameras import orbit_camera
+from active_recon.watching.advice import Advice
 from active_recon.watching.upload import LARGEST_UPLOAD, UploadServer
 from active_recon.watching.watcher import Progress, Verdicts
 import numpy as np
@@ -31,6 +34,27 @@ def test_a_phone_sends_a_photo_and_is_told_where_to_stand(chromium, tmp_path):
         chromium.until(lambda: sketch.get_property('naturalWidth') == 9, 'the sketch')
         assert chromium.run('return document.documentElement.scrollWidth') <= PHONE[0]
         assert not chromium.errors()
+    finally:
+        server.close()
+
+
+def test_who_cannot_stand_there_is_told_another_place(chromium, tmp_path):
+    def there(words):
+        return Progress([words], advice=Advice(Goal(orbit_camera(0.0), [], np.zeros(0)), None))
+
+    now = [Progress()]
+    server = UploadServer(tmp_path, lambda: now[0], Verdicts(), skip=lambda seconds: (
+        now.__setitem__(0, there('Next: a quarter of a turn.'))))
+    try:
+        chromium.open(server.url, PHONE)
+        chromium.until(lambda: 'Waiting for the first photo.' in chromium.text(), 'the state')
+        button = chromium.driver.find_element('id', 'skip')
+        assert not button.is_displayed()
+        now[0] = there('Next: half a turn.')
+        chromium.until(button.is_displayed, 'the button')
+        button.click()
+        chromium.until(lambda: 'Next: a quarter of a turn.' in chromium.text(), 'another place')
+        assert 'half a turn' not in chromium.text() and not chromium.errors()
     finally:
         server.close()
 
