@@ -20,6 +20,7 @@ from rclpy.task import Future
 from std_srvs.srv import Trigger
 
 BUTTONS = {'next_object': ('Next object', 'Show the camera the next object, in a new episode.'),
+           'skip_goal': ('Skip goal', 'Leave the open goal out, and ask for the next best.'),
            'start_episode': ('New episode', 'Discard the reconstruction and begin an episode.'),
            'save_mesh': ('Save mesh', 'Save the object as a mesh, where the reconstructor runs.')}
 TOPICS = ('camera/image_raw', 'camera/camera_info', 'camera/pose', 'view', 'views', 'occupancy',

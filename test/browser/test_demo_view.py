@@ -95,6 +95,8 @@ def test_the_page_follows_the_loop_and_begins_a_new_episode_when_asked(demo, chr
     chromium.run(_CLICK, 'New episode')
     chromium.until(lambda: episode(chromium.text()) not in ('', first), 'another', BUDGET_S)
     chromium.until(lambda: 'Done (max views): 2 views' in chromium.text(), 'its end', BUDGET_S)
+    chromium.run(_CLICK, 'Skip goal')
+    chromium.until(lambda: 'no goal to skip: expected an open one' in chromium.text(), 'no goal')
     chromium.run(_CLICK, 'Save mesh')
     chromium.until(lambda: re.search(r'\w+-2\.ply', chromium.text()), 'the mesh', BUDGET_S)
     assert not chromium.errors()
