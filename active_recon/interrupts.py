@@ -2,14 +2,34 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+import os
 import signal
 import threading
+from types import FrameType
+
+_IMPORTING = '<frozen importlib._bootstrap>'
+_AGAIN_AFTER = 0.01  # seconds
 
 
 def stop_signals() -> tuple[signal.Signals, ...]:
     """Return the signals of Ctrl-C, `kill` and, without `nohup`, a terminal that is closed."""
     is_ignored = signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
     return (signal.SIGINT, signal.SIGTERM, *(() if is_ignored else (signal.SIGHUP,)))
+
+
+def interrupt(kind: int, frame: FrameType | None) -> None:
+    """
+    Raise KeyboardInterrupt, after an import that is going on: what a command does on a signal.
+
+    Some libraries take whatever ends the import of another one for the want of that one.
+    """
+    while frame is not None and frame.f_code.co_filename != _IMPORTING:
+        frame = frame.f_back
+    if frame is None:
+        raise KeyboardInterrupt
+    again = threading.Timer(_AGAIN_AFTER, os.kill, (os.getpid(), kind))
+    again.daemon = True
+    again.start()
 
 
 @contextmanager

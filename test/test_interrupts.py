@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 
+from active_recon.cli import main as commands
 from active_recon.interrupts import held_interrupts, stop_signals
 import pytest
 
@@ -32,6 +33,32 @@ def test_what_nohup_started_outlives_its_terminal(hangup):
     with held_interrupts() as raise_if_asked:
         os.kill(os.getpid(), hangup)
         raise_if_asked()
+
+
+@pytest.mark.parametrize('asked', [signal.SIGINT, signal.SIGTERM])
+def test_a_command_hears_what_asks_it_to_stop_in_an_import_once_that_is_done(
+        asked, hangup, tmp_path, monkeypatch):
+    (tmp_path / 'swallowing.py').write_text(
+        f'import os\ntry:\n    os.kill(os.getpid(), {asked:d})\nexcept BaseException:\n    pass\n'
+        'imported = True\n')
+    monkeypatch.syspath_prepend(tmp_path)
+    imported = []
+
+    def run():
+        from swallowing import imported as whole
+        imported.append(whole)
+        time.sleep(5)
+
+    monkeypatch.setattr(commands, 'app', run)
+    before = {kind: signal.getsignal(kind) for kind in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            commands.main()
+    finally:
+        del sys.modules['swallowing']
+        for kind, handler in before.items():
+            signal.signal(kind, handler)
+    assert imported == [True]
 
 
 @pytest.mark.parametrize('asked', [

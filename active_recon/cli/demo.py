@@ -4,7 +4,6 @@ from pathlib import Path
 from typing import Annotated
 
 from active_recon.cli.policy_option import policy_option
-from active_recon.interrupts import held_interrupts
 from active_recon.policies import AUTO_POLICY
 from active_recon.runtimes.precision import PRECISIONS
 import typer
@@ -32,14 +31,12 @@ def demo(
         '--view', help='Also show the loop in the browser; it then runs until Ctrl-C.')] = False,
 ) -> None:
     """Reconstruct an object with a simulated camera that chooses its own next view."""
+    from active_recon.demo.run import Demo, run_demo
+    from active_recon.objects import find_object
     from rich.console import Console
 
     console = Console(markup=False, emoji=False)  # names of files may have brackets
     try:
-        with held_interrupts():  # some libraries swallow an interrupt of their import
-            from active_recon.demo.run import Demo, run_demo
-            from active_recon.objects import find_object
-
         folder = run_demo(
             Demo(find_object(object_name), views, policy, seed, output_dir, view, model,
                  precision),

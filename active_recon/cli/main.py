@@ -34,7 +34,7 @@ from active_recon.cli.train_segmenter import train_segmenter
 from active_recon.cli.up import up
 from active_recon.cli.view import view
 from active_recon.errors import ActiveReconError
-from active_recon.interrupts import stop_signals
+from active_recon.interrupts import interrupt, stop_signals
 import typer
 
 app = typer.Typer(
@@ -91,8 +91,10 @@ def main() -> None:
 
     `kill` and a terminal that is closed end it as Ctrl-C does: nothing unfinished stays.
     """
-    for asked in set(stop_signals()) - {signal.SIGINT}:  # which a shell may have them ignore
-        signal.signal(asked, signal.default_int_handler)
+    for asked in stop_signals():
+        # Of a shell's background, Ctrl-C is not for the command
+        if asked != signal.SIGINT or signal.getsignal(asked) != signal.SIG_IGN:
+            signal.signal(asked, interrupt)
     try:
         app()
     except (ActiveReconError, OSError) as error:

@@ -9,6 +9,8 @@ import signal
 import threading
 from typing import Any
 
+from active_recon.interrupts import held_interrupts
+
 
 class WorkerPool(ProcessPoolExecutor):
     """
@@ -28,7 +30,9 @@ class WorkerPool(ProcessPoolExecutor):
         # A process starts with what is blocked: Ctrl-C would end its imports in a traceback
         before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
-            return super().submit(function, *given, **more)
+            # Another thread may get it, for this one: the pool could not end, half started
+            with held_interrupts():
+                return super().submit(function, *given, **more)
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
