@@ -10,7 +10,7 @@ from active_recon.models.scorer_weights import save_scorer
 from active_recon.models.view_scorer import ScorerConfig, ViewScorer
 from active_recon.models.weights_files import find_weights
 from active_recon.policies import load_policy, PolicyOptions
-from command_line import command
+from command_line import command, refusal
 import numpy as np
 import pytest
 from safetensors.numpy import load_file
@@ -107,6 +107,35 @@ def test_a_policy_follows_a_network_that_was_trained_further(
                    tmp_path / 'other') == 2
     assert 'of other sizes' in capsys.readouterr().err
     assert not (tmp_path / 'other').exists()
+
+
+def test_objects_whose_gains_cannot_be_measured_are_told_with_the_reason(
+        dataset, weights, tmp_path, monkeypatch, capsys):
+    data = shutil.copytree(dataset, tmp_path / 'data')
+    for voxels in data.glob('ShapeNetVox*/lamp/*0/model.binvox'):
+        voxels.write_text('bad')
+    assert command(monkeypatch, 'train-policy', data, '--validation', dataset, '--model', weights,
+                   '--candidates', 3, '--starts', 1, '--views', 2, '--epochs', 1, '--threads', 1,
+                   '--rounds', 1, '--out', tmp_path / 'run') == 0
+    told = capsys.readouterr().err
+    assert 'left out: ' in told and 'model.binvox: no readable' in told
+    assert f'gains of {data}, round 1: 3 read, 0 missing, 1 left out' in told
+
+
+def test_a_training_without_validation_objects_is_refused_before_gains_are_measured(
+        dataset, weights, tmp_path, monkeypatch, capsys):
+    (tmp_path / 'empty' / 'ShapeNetRendering').mkdir(parents=True)
+    assert 'a dataset without objects: expected one or more' in refusal(
+        monkeypatch, capsys, 'train-policy', dataset, '--validation', tmp_path / 'empty',
+        '--model', weights, '--out', tmp_path / 'run')
+    assert not (tmp_path / 'run').exists()
+
+
+def test_a_folder_of_a_training_that_cannot_be_written_is_told_in_plain_words(
+        dataset, weights, monkeypatch, capsys):
+    assert f'{weights}/run/carving-scorer.safetensors: cannot be written: expected a folder' in (
+        refusal(monkeypatch, capsys, 'train-policy', dataset, '--validation', dataset, '--model',
+                weights, '--out', weights / 'run'))
 
 
 def test_weights_without_a_scorer_have_no_learned_policy(weights):

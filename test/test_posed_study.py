@@ -223,7 +223,7 @@ def test_a_network_of_smaller_images_is_measured_on_the_same_views(made, carving
 
 def test_gains_are_measured_of_a_network_of_smaller_images(made, small, tmp_path):
     folder = list_objects(made)[0]
-    (path,) = collect_gains([folder], small, Collecting(1, 3, 1, 2), tmp_path)
+    (path,), _ = collect_gains([folder], small, Collecting(1, 3, 1, 2), tmp_path)
     assert np.isfinite(ViewGains.load(path).gains).any()
 
 

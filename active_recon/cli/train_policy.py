@@ -8,10 +8,11 @@ from active_recon.cli.bf16_option import Bf16, in_bf16
 from active_recon.cli.cluster_option import Cluster, reachable, workers_of
 from active_recon.cli.command_line import command_line
 from active_recon.cli.progress import progress_bar
-from active_recon.cli.reading import warn_of_shared_objects
+from active_recon.cli.reading import print_left_out, warn_of_shared_objects
 from active_recon.cli.runtime_option import MeasuredIn
 from active_recon.errors import ConfigError
 from active_recon.models.weights_files import DEFAULT_MODEL
+from active_recon.whole_files import writable
 import typer
 
 if TYPE_CHECKING:
@@ -74,7 +75,7 @@ def train_policy(
 
       active-recon train-policy turn/train things/train --validation turn/val --out runs/policy
     """
-    from active_recon.datasets.layout import list_objects
+    from active_recon.datasets.layout import needed_objects
     from active_recon.evaluation.posed.entrants import load_entrants
     from active_recon.models.scorer_weights import load_scorer_of_any_network, save_scorer
     from active_recon.models.view_scorer import ScorerConfig
@@ -105,9 +106,11 @@ def train_policy(
     held_out: list[LookedStates] = []
     begun = None if init_from is None else load_scorer_of_any_network(init_from)
     scorer_to_train(config, begun)  # refuses other sizes before anything is measured
-    trained, tested = ([each for folder in folders for each in list_objects(folder)]
+    trained, tested = ([each for folder in folders for each in needed_objects(folder)]
                        for folders in (data, validation))
     warn_of_shared_objects(trained, tested, 'the expected gains are biased')
+    assert entrant.path is not None  # of a file, as all that are loaded
+    path = writable(out / scorer_path(entrant.path).name)
     scorer = begun
     told: list[dict[str, Any]] = []
     # What the views that gains are measured after were chosen by
@@ -129,8 +132,6 @@ def train_policy(
                      'validation_share_of_the_one_step_gap': shares})
         typer.echo(f'round {number}: {shares["all"]:.2f} of the one-step gap on validation')
     assert scorer is not None
-    assert entrant.path is not None  # of a file, as all that are loaded
-    path = out / scorer_path(entrant.path).name
     save_scorer(path, scorer, config, entrant.weights, {
         'command': command_line(), 'network': entrant.name,
         'training': training.to_dict(), 'collecting': collecting.to_dict(),
@@ -162,9 +163,11 @@ class _Source:
         for folder in folders:
             kept = self._out / f'gains-{number}' / '-'.join(folder.parts).strip('/-')
             drawn = drawn_objects(folder.absolute(), self._collecting.objects, number)
-            with progress_bar(f'gains of {folder}, round {number}', len(drawn)) as advance:
-                files = collect_gains(drawn, self._entrant, self._collecting, kept, policy,
-                                      advance, self._crew, self._chosen_by)
+            title = f'gains of {folder}, round {number}'
+            with progress_bar(title, len(drawn)) as advance:
+                files, left_out = collect_gains(drawn, self._entrant, self._collecting, kept,
+                                                policy, advance, self._crew, self._chosen_by)
+            print_left_out(title, len(files), (), left_out)
             self._counts[f'{folder}, round {number}'] = len(files)
             found += [looked_states(ViewGains.load(file), self._patches) for file in files]
         return found

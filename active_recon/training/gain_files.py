@@ -83,13 +83,13 @@ def collect_gains(folders: Sequence[ObjectFolder], entrant: Entrant, collecting:
                   out: Path, policy: Policy | None = None,
                   advance: Advance = lambda steps, note: None,
                   crew: Crew | None = None,
-                  chosen_by: Mapping[str, Any] | None = None) -> list[Path]:
+                  chosen_by: Mapping[str, Any] | None = None) -> tuple[list[Path], list[str]]:
     """
-    Measure the gains of objects into files, one an object; return the files.
+    Measure the gains of objects into files; return these, and why objects are left out.
 
     Files that are there already are kept. Views are chosen by the policy, or by a mixture of
     random, farthest, an even sweep and the greatest gain. Each object is shown under a light,
-    noise and pose errors of its own. Objects that cannot be read are left out; raises DataError
+    noise and pose errors of its own. Objects that cannot be read are left out. Raises DataError
     where none is left or the note of how gains were collected is damaged, and ConfigError where
     gains of another network, or collected otherwise, are there. `crew` does the work; None: this
     process.
@@ -99,14 +99,19 @@ def collect_gains(folders: Sequence[ObjectFolder], entrant: Entrant, collecting:
     keep = partial(_keep, entrant, collecting, out, policy, torch.get_num_threads())
     workers = crew or LocalCrew(1)
     results = workers.map(keep, folders, out, sorted({folder.root for folder in folders}))
+    left_out = []
     for result in told(results, workers, advance):
         if result.refusal and result.kind not in _LEFT_OUT:
             raise WorkError(f'{folders[result.index].name}: {result.refusal}', result.kind)
+        if result.refusal:
+            *_, reason = result.refusal.splitlines()  # after that its dataset, of one, has none
+            left_out.append(reason.strip())
     files = [path for folder in folders if (path := _file(out, folder)).is_file()]
     if not files:
+        reasons = '\n  '.join(['got none', *sorted(left_out)])
         raise DataError(f'{out}: no object whose gains can be measured: expected one or more '
-                        f'with voxels and {_FEWEST} images, got none')
-    return files
+                        f'with voxels and {_FEWEST} images, {reasons}')
+    return files, sorted(left_out)
 
 
 def _keep_apart(out: Path, collected: dict[str, Any]) -> None:
