@@ -155,9 +155,9 @@ def test_an_unknown_part_is_refused(study):
 def paper(monkeypatch, study, *arguments):
     """Run `active-recon paper` with the study's settings; return its exit code."""
     before = torch.get_num_threads()
-    code = command(monkeypatch, 'paper', *arguments, '--data', study.data, '--models',
-                   study.models, '--out', study.out, '--model', study.model, '--samples', 96,
-                   '--starts', 2, '--threads', 1)
+    code = command(monkeypatch, 'paper', '--data', study.data, '--models', study.models, '--out',
+                   study.out, '--model', study.model, '--samples', 96, '--starts', 2, '--threads',
+                   1, *arguments)
     torch.set_num_threads(before)
     return code
 
@@ -175,6 +175,16 @@ def test_the_command_refuses_parts_that_there_are_not(study, monkeypatch, capsys
     assert 'expected some of table1,' in capsys.readouterr().err
     assert paper(monkeypatch, study, 'table1', '--device', 'tpu') == 2
     assert '--device: no such device: expected cpu, or cuda' in capsys.readouterr().err
+
+
+def test_what_only_a_later_part_needs_is_refused_before_an_earlier_one_is_made(
+        study, tmp_path, monkeypatch, capsys):
+    for option, reason in (('--model', "expected weights of the paper's network"),
+                           ('--pascal3d', 'not the PASCAL3D+ dataset')):
+        assert paper(monkeypatch, study, 'systems', 'fig7', 'table4', option,
+                     tmp_path / 'missing') == 2
+        out, told = capsys.readouterr()
+        assert reason in told and not out
 
 
 def test_the_document_tells_every_part(study):

@@ -85,6 +85,8 @@ def paper(
 
     Example: active-recon paper table1 --samples 20000 --out /tmp/results
     """
+    from active_recon.datasets.pascal3d import require_pascal3d
+    from active_recon.models.weights_files import weights_hash
     from active_recon.paper.parts import PARTS
     from active_recon.paper.study import Study
     import torch
@@ -100,11 +102,14 @@ def paper(
     data, models, out = (require_path(folder) for folder in (data, models, out))
     if cluster and device != 'cpu':
         raise ConfigError(f'--cluster: expected --device cpu, got {device}')
-    writable(out / 'README.md')  # tells before hours of training
+    if pascal3d is not None:
+        require_pascal3d(pascal3d)
+    writable(out / 'README.md')
     torch.set_num_threads(threads)
     study = Study(data, models, out, model, pascal3d, tuple(training or ('train',)), samples,
                   starts, seed, threads, policy_seeds, policy_starts, subset_objects, device,
                   progress=progress_bar)
+    weights_hash(study.weights)  # all of this is told before hours of training
     wanted = [*PARTS, DOCUMENT] if ALL in parts else list(dict.fromkeys(parts))
     with workers_of(cluster, workers) if cluster else nullcontext() as crew:
         for part in wanted:

@@ -32,6 +32,14 @@ _FLAGS = ('truncated', 'occluded', 'difficult')
 _SUFFIXES = ('.jpg', '.JPEG', '.jpeg', '.png')
 
 
+def require_pascal3d(root: Path) -> None:
+    """Raise DataError where the folder is not PASCAL3D+."""
+    for name in ('Annotations', 'Images', 'CAD'):
+        if not (root / name).is_dir():
+            raise DataError(f'{root}: not the PASCAL3D+ dataset: expected its folders '
+                            f'Annotations, Images and CAD, found no folder {name}')
+
+
 def list_photographs(root: Path, categories: Sequence[str] = ()) -> tuple[
         list[Photograph], list[str]]:
     """
@@ -41,10 +49,7 @@ def list_photographs(root: Path, categories: Sequence[str] = ()) -> tuple[
     viewpoint or with unreadable files; for each there is a line with the reason. Raises DataError
     if the folder is not PASCAL3D+ or lacks one of the categories.
     """
-    for name in ('Annotations', 'Images', 'CAD'):
-        if not (root / name).is_dir():
-            raise DataError(f'{root}: not the PASCAL3D+ dataset: expected its folders '
-                            f'Annotations, Images and CAD, found no folder {name}')
+    require_pascal3d(root)
     folders = [(folder, CLASSES.get(kind, kind))
                for folder in sorted((root / 'Annotations').iterdir())
                if folder.is_dir() and (kind := folder.name.rpartition('_')[0])]
