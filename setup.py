@@ -81,11 +81,12 @@ setup(
         'lint': ['mypy>=1.11', 'ruff>=0.6'],
         'onnxruntime': ['onnxruntime>=1.21,<2'],
         's3': ['s3fs>=2025.2'],
+        'sfm': ['pycolmap>=4,<5'],
         'test': [
             'coacd>=1.0.5,<2', 'mcap-ros2-support>=0.5.5', 'mujoco>=3.7,<4', 'onnx>=1.17,<2',
             'onnxruntime>=1.21,<2', 'point-cloud-utils>=0.34', 'pyarrow>=18,<28',
-            'pymcap-cli>=0.30', 'pytest>=8', 'pytest-xdist>=3.6', 'ray[client]>=2.52,<3',
-            'rosless>=0.5', 'selenium>=4.20', 'setuptools>=70.1'],
+            'pycolmap>=4,<5', 'pymcap-cli>=0.30', 'pytest>=8', 'pytest-xdist>=3.6',
+            'ray[client]>=2.52,<3', 'rosless>=0.5', 'selenium>=4.20', 'setuptools>=70.1'],
         # A store's server, for the long tests
         'test-full': ['flask>=3,<4', 'flask-cors>=5', 'moto[s3]>=5,<6', 's3fs>=2025.2'],
     },

@@ -8,6 +8,8 @@ import numpy as np
 LENS = Intrinsics(700, 700, 320, 240, 640, 480)
 PATTERNS = {'boards': (6, 200), 'coarse': (12, 12), 'fine': (60, 60)}
 """Tables: of wood, or with spots in all colours; how many of them across and along."""
+PRINT = 'print'
+"""A table that is covered with a newspaper: words and pictures."""
 _SIDE, _PIXELS = 1.5, 1024  # of the table, metres, and of its pattern
 _NOISE = 2.0  # grey levels
 
@@ -42,11 +44,29 @@ def photographed(mesh, cameras, pattern, rng):
 
 
 def _table(pattern, rng):
+    if pattern == PRINT:
+        return _newspaper(rng)
     across, along = PATTERNS[pattern]
     if pattern != 'boards':
         return _enlarged(rng.integers(0, 256, (along, across, 3)), _PIXELS, _PIXELS)
     grain = _enlarged(rng.integers(90, 190, (across, along)), _PIXELS, _PIXELS)
     return grain[..., None] * [1.0, 0.75, 0.5]
+
+
+def _newspaper(rng):
+    sheet = np.full((_PIXELS, _PIXELS, 3), 235, np.uint8)
+    for line in range(10, _PIXELS, 9):
+        at = 0
+        while at < _PIXELS:
+            word = ''.join(map(chr, rng.integers(97, 123, rng.integers(2, 9))))
+            cv2.putText(sheet, word, (at, line), cv2.FONT_HERSHEY_SIMPLEX, 0.3, (40, 40, 45), 1,
+                        cv2.LINE_AA)
+            at += 6 * len(word) + 6
+    for across, down in rng.integers(0, _PIXELS - 120, (25, 2)):
+        wide, high = rng.integers(40, 120, 2)
+        sheet[down:down + high, across:across + wide] = _enlarged(
+            rng.integers(0, 256, (5, 7, 3)), int(wide), int(high))
+    return sheet.astype(np.float32)
 
 
 def _enlarged(drawn, width, height):

@@ -111,7 +111,7 @@ def test_a_turntable_s_steps_are_azimuths_the_other_way_round(tmp_path):
     for step, view in ((0, 1), (0.2, 4)):
         with pytest.raises(ConfigError, match='expected'):
             posed_by(TurntableCameras(step, 0.3, 0.6, view), photos)
-    with pytest.raises(ConfigError, match='axes: with a board or a turntable'):
+    with pytest.raises(ConfigError, match='axes: without a file of cameras'):
         posed_by(source, photos, 'opengl')
 
 

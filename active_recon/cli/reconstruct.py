@@ -43,6 +43,11 @@ def reconstruct(
     camera_info: Annotated[Path | None, typer.Option(
         help="With --board: lens in the YAML format of ROS's camera_calibration; default: "
              'estimated from the photos.')] = None,
+    sfm: Annotated[bool, typer.Option(
+        '--sfm', help='Find the cameras from the photos alone, by structure from motion: 15 or '
+                      'more around the object, at most 20 degrees apart, with the object on '
+                      'something finely patterned. COLMAP does it (pip install '
+                      "'active_recon[sfm]'). Give --size: photos tell no scale.")] = False,
     turntable_step_deg: Annotated[float | None, typer.Option(
         help='The photos, in their order, show a turntable that turns by this angle between them, '
              'counter-clockwise seen from above, before a fixed camera.')] = None,
@@ -102,15 +107,17 @@ def reconstruct(
                               'as much of IoU.')] = 0.005,
 ) -> None:
     """
-    Reconstruct an object from a folder of photos with known cameras.
+    Reconstruct an object from a folder of photos.
 
     No ROS runs, nothing has to be cropped, and masks are not needed. The cameras come from a file,
-    from a printed board in the photos, or from the steps of a turntable. What is wrong with a
-    photo is said in one line, and the others are used.
+    from a printed board in the photos, from the steps of a turntable, or from the photos alone.
+    What is wrong with a photo is said in one line, and the others are used.
 
     Example: active-recon reconstruct photos/ --cameras transforms.json --out mug
 
     Example: active-recon reconstruct photos/ --board --size 0.2
+
+    Example: active-recon reconstruct photos/ --sfm --size 0.2
 
     Example: active-recon reconstruct photos/ --watch --board --lan
     """
@@ -151,8 +158,13 @@ def reconstruct(
         sources.append(TurntableCameras(
             math.radians(turntable_step_deg), math.radians(elevation_deg), distance,
             None if fov_deg is None else math.radians(fov_deg)))
-    if board and axes is not None:
-        raise ConfigError('--axes with --board: it is for a file of cameras')
+    if sfm:
+        from active_recon.photos.sources import SfmCameras
+
+        sources.append(SfmCameras())
+    if (board or sfm) and axes is not None:
+        raise ConfigError(f'--axes with --{"board" if board else "sfm"}: it is for a file of '
+                          'cameras')
     if out.resolve() == photos.resolve():
         raise ConfigError(f'--out: the folder of photos, {out}: its picture.png would be a photo '
                           'of the next run; give another folder')
@@ -160,8 +172,8 @@ def reconstruct(
         raise ConfigError(f'--out: no folder: expected one, or a name for a new one, got the file '
                           f'{out}')
     if len(sources) > 1:
-        raise ConfigError('several of --cameras, --board and --turntable-step-deg: give one of '
-                          'them')
+        raise ConfigError('several of --cameras, --board, --turntable-step-deg and --sfm: give '
+                          'one of them')
     source = sources[0] if sources else None
     options = Options(None if box is None else box_numbers(box), unit, size, up, axes, background,
                       masks, views, model, order=order, ground=ground)

@@ -68,7 +68,8 @@ def _entry(image: _Image, lenses: Mapping[int, Lens], path: Path) -> Entry:
     return Entry(name, rigid(rotation.T, -rotation.T @ moved, f'{path}: {name}'), lenses[camera])
 
 
-def _lens(model: str, width: int, height: int, numbers: tuple[float, ...]) -> Lens:
+def colmap_lens(model: str, width: int, height: int, numbers: tuple[float, ...]) -> Lens:
+    """Return the lens of a camera by its model's name and numbers; raises ValueError if unfit."""
     if model not in _COUNTS or len(numbers) != _COUNTS[model]:
         raise ValueError(f'a camera of the model {model} with {len(numbers)} parameters')
     across, *rest = numbers
@@ -97,7 +98,8 @@ def _text_lenses(text: str) -> Iterator[tuple[int, Lens]]:
         if not line:
             continue
         identity, model, width, height, *numbers = line.split()
-        yield int(identity), _lens(model, int(width), int(height), tuple(map(float, numbers)))
+        yield int(identity), colmap_lens(
+            model, int(width), int(height), tuple(map(float, numbers)))
 
 
 def _text_images(text: str) -> Iterator[_Image]:
@@ -126,7 +128,7 @@ def _binary_lenses(data: bytes) -> Iterator[tuple[int, Lens]]:
         model, size = _MODELS[kind]
         numbers = struct.unpack_from(f'<{size}d', data, at + 24)
         at += 24 + 8 * size
-        yield identity, _lens(model, width, height, numbers)
+        yield identity, colmap_lens(model, width, height, numbers)
 
 
 def _binary_images(data: bytes) -> Iterator[_Image]:

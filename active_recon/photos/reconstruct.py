@@ -29,7 +29,7 @@ from active_recon.photos.integrating import (
 from active_recon.photos.options import Options
 from active_recon.photos.segmented_views import segmented_views
 from active_recon.photos.shape import Shape, TakenView
-from active_recon.photos.sources import posed_by, Source, TurntableCameras
+from active_recon.photos.sources import posed_by, SfmCameras, Source, TurntableCameras
 from active_recon.photos.views import load_views, PhotoView, view_of
 from active_recon.reconstructor import load, Reconstructor
 from active_recon.reporting import Reporting, silent
@@ -41,6 +41,8 @@ from numpy.typing import NDArray
 
 T = TypeVar('T')
 _DEFAULTS = Options()
+_NO_SCALE = ("the scale is not known: the object's longest side is taken for 1 m; give it by "
+             '--size')
 _EACH_IMAGE = 'files, or with pixels'
 _EACH_CAMERA = 'a Camera(pose, intrinsics) for each image'
 
@@ -91,8 +93,13 @@ def from_files(place: Path | Sequence[Path], source: Source | None, options: Opt
     """
     Reconstruct from photos, a folder or files, whose cameras are found as in `posed_by`.
 
-    Raises ActiveReconError where no photo can be used.
+    By structure from motion no scale is known: without a size the cube's side is 1 m, which a
+    warning says. Raises ActiveReconError where no photo can be used.
     """
+    is_scaled = not isinstance(source, SfmCameras) or options.size is not None
+    if isinstance(source, SfmCameras):
+        _require_no_lengths(options)
+        options = replace(options, size=options.size or 1.0)
     photos, left_out = open_photos(photo_paths(place))
     with _telling(left_out):
         ordered = in_order_of(options.order, photos)
@@ -106,7 +113,16 @@ def from_files(place: Path | Sequence[Path], source: Source | None, options: Opt
         with reporting('reading the photos', len(chosen)) as advance:
             views, unread = load_views(chosen, options.masks, advance)
         left_out += unread
-        return from_views(views, file, options, left_out, reporting)
+        shape = from_views(views, file, options, left_out, reporting)
+    return shape if is_scaled else replace(shape, warnings=[*shape.warnings, _NO_SCALE])
+
+
+def _require_no_lengths(options: Options) -> None:
+    """Raise ConfigError on lengths in units of cameras that are not found yet."""
+    if options.box is not None or options.unit != 1:
+        raise ConfigError('box or unit with structure from motion: the unit of the cameras that '
+                          "it finds is arbitrary; expected size, the object's longest side in "
+                          'metres')
 
 
 @contextmanager

@@ -1,4 +1,4 @@
-"""Where the cameras of photos come from: a file, a board in the photos, or a turntable's steps."""
+"""Where the cameras of photos come from: a file, a board, a turntable's steps, or the photos."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -10,6 +10,7 @@ from active_recon.photos.board_photos import board_photos
 from active_recon.photos.camera_file import CameraFile, posed_photos, PosedPhoto
 from active_recon.photos.files import PhotoFile
 from active_recon.photos.readers import find_cameras, FORMATS, read_cameras
+from active_recon.photos.structure_from_motion import sfm_photos
 from active_recon.photos.turntable_photos import turntable_photos
 from active_recon.reporting import Reporting, silent
 
@@ -36,7 +37,12 @@ class TurntableCameras:
     field_of_view: float | None = None
 
 
-Source = Path | BoardCameras | TurntableCameras
+@dataclass(frozen=True)
+class SfmCameras:
+    """Structure from motion: photos that overlap, of which nothing is known, see `sfm_photos`."""
+
+
+Source = Path | BoardCameras | TurntableCameras | SfmCameras
 
 
 def posed_by(source: Source | None, photos: Sequence[PhotoFile], axes: str | None = None,
@@ -48,8 +54,8 @@ def posed_by(source: Source | None, photos: Sequence[PhotoFile], axes: str | Non
     files alone, see `read_cameras`. Raises DataError where no photo has a camera, ConfigError on
     `axes` without a file.
     """
-    if axes is not None and isinstance(source, BoardCameras | TurntableCameras):
-        raise ConfigError('axes: with a board or a turntable: they are for a file of cameras')
+    if axes is not None and source is not None and not isinstance(source, Path):
+        raise ConfigError('axes: without a file of cameras: they are those of its format')
     if isinstance(source, BoardCameras):
         with reporting('searching the board', len(photos)) as advance:
             return board_photos(photos, source.board, source.lens_file, advance)
@@ -57,11 +63,14 @@ def posed_by(source: Source | None, photos: Sequence[PhotoFile], axes: str | Non
         file, posed = turntable_photos(photos, source.step, source.elevation, source.distance,
                                        source.field_of_view)
         return file, posed, []
+    if isinstance(source, SfmCameras):
+        return sfm_photos(photos, reporting)
     folder = photos[0].path.parent
     path = place_of_cameras(source, folder)
     if path is None:
         raise DataError(f'{folder}: no cameras beside the photos: expected {FORMATS}; name the '
-                        'file by --cameras', 'no_cameras')
+                        'file by --cameras, or let --sfm find them from photos that overlap',
+                        'no_cameras')
     file = read_cameras(path, photos, axes)
     posed, left_out = posed_photos(file, photos)
     if any(each.is_turned for each in posed):

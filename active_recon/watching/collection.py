@@ -22,6 +22,7 @@ from active_recon.photos.sources import (
     BoardCameras,
     place_of_cameras,
     posed_by,
+    SfmCameras,
     Source,
     TurntableCameras,
 )
@@ -57,9 +58,10 @@ class Collection:
     """
 
     def __init__(self, source: Source | None, options: Options) -> None:
-        if isinstance(source, TurntableCameras):
-            raise ConfigError('photos that arrive cannot be those of a turntable, whose order '
-                              'tells their cameras: expected a board or a file of cameras')
+        if isinstance(source, TurntableCameras | SfmCameras):
+            raise ConfigError('photos that arrive have no cameras that all photos tell together, '
+                              'as those of a turntable or of structure from motion: expected a '
+                              'board or a file of cameras')
         self._source = source
         self._options = options
         self._reconstructor = load(options.model, threads=options.threads)
@@ -172,7 +174,7 @@ class Collection:
         found: dict[Path, tuple[int, int]] = {}
         if self.board is not None or not self._kept:
             return found
-        assert not isinstance(self._source, BoardCameras | TurntableCameras)
+        assert self._source is None or isinstance(self._source, Path)
         place = place_of_cameras(self._source, next(iter(self._kept)).parent)
         with suppress(OSError):  # gone since
             for path in [] if place is None else camera_files(place):
