@@ -28,6 +28,7 @@ from active_recon.photos.structure_from_motion import sfm_photos
 from active_recon.photos.views import load_views, PhotoView
 from active_recon.volumes.meshes import load_mesh
 from benchmarks.photos_on_tables import interval, SIZE, some_models
+from benchmarks.studies import with_tables_between_marks
 from benchmarks.world_iou import iou_around
 import numpy as np
 from numpy.typing import NDArray
@@ -79,10 +80,11 @@ def _measured(model: Path, number: int) -> Mapping[str, Any]:
     told = CameraFile('true', (), np.array([0.0, 0.0, 1.0]))
     known = [PhotoView(view.name, view.image, _sized(cameras[int(Path(view.name).stem)], view))
              for view in views]
+    alone, known_iou = (_iou(views, file, mesh, true_from_found),
+                        _iou(known, told, mesh, np.eye(4)))
     return {'object': model.stem, 'placed': len(posed) / _PHOTOS, 'took_s': took_s,
-            'position_error': float(np.median(off)) / _DISTANCE,
-            'iou': _iou(views, file, mesh, true_from_found),
-            'iou_cameras_told': _iou(known, told, mesh, np.eye(4))}
+            'position_error': float(np.median(off)) / _DISTANCE, 'iou': alone,
+            'iou_cameras_told': known_iou, 'difference': alone - known_iou}
 
 
 def _sized(camera: Camera, view: PhotoView) -> Camera:
@@ -126,10 +128,16 @@ def table(result: Mapping[str, Any]) -> Iterator[str]:
              '.2%'),
             ('iou', f'IoU, {result["used"]} of the photos, from the photos alone', '.3f'),
             ('iou_cameras_told', 'IoU of the same photos, with true cameras', '.3f'),
+            ('difference', 'difference of the two, paired', '.3f'),
             ('took_s', 'seconds to find the cameras', '.0f')):
-        found = result[name]
-        yield (f'| {words} | {found["mean"]:{form}} [{found["low"]:{form}}, '
-               f'{found["high"]:{form}}] |')
+        mean, low, high = (f'{result[name][part]:{form}}'.replace('%', ' %')
+                           for part in ('mean', 'low', 'high'))
+        yield f'| {words} | {mean} [{low}, {high}] |'
+
+
+def with_table(text: str, result: Mapping[str, Any]) -> str:
+    """Return a page with the table between its marks."""
+    return with_tables_between_marks(text, {'photos-alone': lambda: table(result)})
 
 
 if __name__ == '__main__':

@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 
 from active_recon.models.weights_files import DEFAULT_MODEL, find_weights, SMALL_MODEL
+from benchmarks import photos_alone
 from benchmarks.photos import with_table
 import numpy as np
 
@@ -20,6 +21,13 @@ def test_the_page_shows_the_figures_that_were_measured():
     assert with_table(text, result, faster) == text
     result['photographs']['auto'][0] = 0.123
     assert '0.123' in with_table(text, result, faster)
+
+
+def test_the_page_shows_what_was_measured_of_photos_alone():
+    result, text = measured('photos-alone'), (ROOT / 'doc/photos.md').read_text()
+    assert photos_alone.with_table(text, result) == text
+    result['iou']['mean'] = 0.123
+    assert '0.123' in photos_alone.with_table(text, result)
 
 
 def test_the_network_of_photos_ships_and_is_ahead_of_the_faster_one():

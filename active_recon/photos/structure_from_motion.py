@@ -16,12 +16,13 @@ import threading
 from typing import Any
 
 from active_recon.errors import ConfigError, DataError
-from active_recon.photos.camera_file import CameraFile, PosedPhoto
+from active_recon.photos.camera_file import CameraFile, Lens, PosedPhoto
 from active_recon.photos.colmap import colmap_lens
 from active_recon.photos.files import PhotoFile, read_photo
 from active_recon.reporting import Advance, by_step, Reporting, silent
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 FEWEST = 3
 """Photos that have to fit together."""
@@ -46,13 +47,13 @@ def sfm_photos(photos: Sequence[PhotoFile], reporting: Reporting = silent
     where pycolmap is not installed, DataError where fewer than FEWEST photos fit.
     """
     colmap = _library()
-    found: Mapping[str, Any] = {}
+    found: Mapping[str, tuple[NDArray[np.float64], Lens]] = {}
     with TemporaryDirectory() as place:
         copies, left_out = _copies(photos, Path(place), reporting)
         for title, patient in _WAYS if len(copies) >= FEWEST else ():
             with reporting(title, 2 * len(copies)) as advance, TemporaryDirectory() as own:
-                images = _images(colmap, copies, Path(place), Path(own), patient, advance)
-            found = max(found, images, key=len)
+                cameras = _cameras(colmap, copies, Path(place), Path(own), patient, advance)
+            found = max(found, cameras, key=len)
             if len(found) == len(copies):
                 break
     if len(found) < FEWEST:
@@ -62,7 +63,9 @@ def sfm_photos(photos: Sequence[PhotoFile], reporting: Reporting = silent
             'degrees from the one before, with the object on something finely patterned, such as '
             'a newspaper, or use --board', 'no_cameras')
     return (CameraFile(_NAME, ()),
-            [_posed(copy.photo, found[copy.name]) for copy in copies if copy.name in found],
+            [PosedPhoto(copy.photo, found[copy.name][0],
+                        found[copy.name][1](copy.photo.upright_size))
+             for copy in copies if copy.name in found],
             [*left_out, *(f'{copy.photo.name}: no camera found: it does not fit the other photos'
                           for copy in copies if copy.name not in found)])
 
@@ -83,6 +86,7 @@ def _copies(photos: Sequence[PhotoFile], folder: Path,
     with reporting('copying the photos', len(photos)) as advance:
         for number, photo in enumerate(photos):
             name = f'{number:05}.png'
+            advance(1, photo.name)
             try:
                 pixels = np.ascontiguousarray(read_photo(photo)[..., 2::-1])
             except DataError as error:
@@ -93,7 +97,6 @@ def _copies(photos: Sequence[PhotoFile], folder: Path,
                                            interpolation=cv2.INTER_AREA), np.uint8)
             cv2.imwrite(str(folder / name), pixels, [cv2.IMWRITE_PNG_COMPRESSION, 1])
             copies.append(_Copy(photo, name, (pixels.shape[1], pixels.shape[0])))
-            advance(1, photo.name)
     return copies, left_out
 
 
@@ -113,9 +116,13 @@ def _library() -> Any:
     return colmap
 
 
-def _images(colmap: Any, copies: Sequence[_Copy], folder: Path, own: Path, patient: bool,
-            advance: Advance) -> Mapping[str, Any]:
-    """Return the images of the largest model by their names; `advance` is told two steps each."""
+def _cameras(colmap: Any, copies: Sequence[_Copy], folder: Path, own: Path, patient: bool,
+             advance: Advance) -> Mapping[str, tuple[NDArray[np.float64], Lens]]:
+    """
+    Return the poses and lenses of the largest model, by the names of the copies.
+
+    `advance` is told two steps for each copy.
+    """
     database, reached, done = own / 'database.db', by_step(advance), 0
     extraction, matching = colmap.FeatureExtractionOptions(), colmap.FeatureMatchingOptions()
     extraction.sift.max_num_features = _FEATURES
@@ -148,15 +155,12 @@ def _images(colmap: Any, copies: Sequence[_Copy], folder: Path, own: Path, patie
     reached(2 * done, 'cameras')
     model = max(models.values(), key=lambda each: int(each.num_reg_images()), default=None)
     return {} if model is None else {
-        image.name: image for image in model.images.values() if image.has_pose}
+        image.name: _camera(image) for image in model.images.values() if image.has_pose}
 
 
-def _posed(photo: PhotoFile, image: Any) -> PosedPhoto:
-    """Return a photo with the camera that COLMAP found for its copy."""
-    camera_from_world = np.eye(4)
+def _camera(image: Any) -> tuple[NDArray[np.float64], Lens]:
+    """Return the pose, world from optical frame, and the lens that COLMAP found for an image."""
+    camera_from_world, camera = np.eye(4), image.camera
     camera_from_world[:3] = image.cam_from_world().matrix()
-    camera = image.camera
-    lens = colmap_lens(camera.model.name, camera.width, camera.height,
-                       tuple(map(float, camera.params)))
-    return PosedPhoto(photo, np.asarray(np.linalg.inv(camera_from_world)),
-                      lens(photo.upright_size))
+    return np.asarray(np.linalg.inv(camera_from_world)), colmap_lens(
+        camera.model.name, camera.width, camera.height, tuple(map(float, camera.params)))
