@@ -151,7 +151,7 @@ def test_what_needs_known_units_or_one_photo_after_the_other_is_refused(folder, 
         active_recon.reconstruct(folder, SfmCameras(), box=(0, 0, 0, 1))
     with pytest.raises(ConfigError, match='axes: without a file of cameras'):
         posed_by(SfmCameras(), photos, 'opengl')
-    with pytest.raises(ConfigError, match='photos that arrive have no cameras'):
+    with pytest.raises(ConfigError, match='structure from motion need all photos at once'):
         Collection(SfmCameras(), Options())
 
 

@@ -59,9 +59,8 @@ class Collection:
 
     def __init__(self, source: Source | None, options: Options) -> None:
         if isinstance(source, TurntableCameras | SfmCameras):
-            raise ConfigError('photos that arrive have no cameras that all photos tell together, '
-                              'as those of a turntable or of structure from motion: expected a '
-                              'board or a file of cameras')
+            raise ConfigError('photos that arrive: expected a board or a file of cameras; a '
+                              'turntable and structure from motion need all photos at once')
         self._source = source
         self._options = options
         self._reconstructor = load(options.model, threads=options.threads)
