@@ -52,6 +52,7 @@ def test_a_command_hears_what_asks_it_to_stop_in_an_import_once_that_is_done(
     monkeypatch.setattr(commands, 'app', run)
     before = {kind: signal.getsignal(kind) for kind in (signal.SIGINT, signal.SIGTERM)}
     try:
+        signal.signal(asked, signal.default_int_handler)  # a shell's background ignores Ctrl-C
         with pytest.raises(KeyboardInterrupt):
             commands.main()
     finally:
