@@ -193,6 +193,7 @@ def study(
     if not files and not halved:
         raise ConfigError('study: nothing to measure: expected files of `quality measure`, or '
                           '--halved with some, got neither')
+    require_writable_study(out, 'quality')
     path = tables or tables_path(find_weights(model))
     found = QualityTables.read(path)
     sha256, sets = found.weights_sha256, {}
@@ -207,6 +208,5 @@ def study(
         sets[f'{halved[0].stem}, second half'] = second
     result = {'command': command_line(), 'weights_sha256': sha256,
               'sets': [{'name': name, **studied(each, found)} for name, each in sets.items()]}
-    require_writable_study(out, 'quality')
     figures, page = write_study(result, markdown(result), out, 'quality')
     typer.echo(f'wrote {figures} and {page}')
