@@ -193,7 +193,6 @@ def study(
     if not files and not halved:
         raise ConfigError('study: nothing to measure: expected files of `quality measure`, or '
                           '--halved with some, got neither')
-    require_writable_study(out, 'quality')
     path = tables or tables_path(find_weights(model))
     found = QualityTables.read(path)
     sha256, sets = found.weights_sha256, {}
@@ -206,6 +205,7 @@ def study(
             raise DataError('--halved: no object of the second half: expected some of sources '
                             f'that {path} was not calibrated on, got none')
         sets[f'{halved[0].stem}, second half'] = second
+    require_writable_study(out, 'quality')
     result = {'command': command_line(), 'weights_sha256': sha256,
               'sets': [{'name': name, **studied(each, found)} for name, each in sets.items()]}
     figures, page = write_study(result, markdown(result), out, 'quality')
