@@ -4,16 +4,13 @@ from array import array
 import math
 import re
 
-from active_recon.geometry.cameras import orbit_camera
 from geometry_msgs.msg import PoseStamped
-from msg_tools.cameras import camera_to_msgs
 from msg_tools.stamps import nanoseconds_from_stamp
 import numpy as np
 import pytest
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Header
 
-from .conftest import ANY_WEIGHTS, BUDGET_S, FakeCamera, SEND_AGAIN_S
+from .conftest import ANY_WEIGHTS, FakeCamera
 
 pytestmark = pytest.mark.ros
 
@@ -163,22 +160,6 @@ def test_what_is_late_of_the_last_episode_never_reaches_the_new_one(
     assert taken > late
 
 
-def test_a_goal_without_a_stamp_is_refused(start_node, bench):
-    node = start_node('reconstructor', weights=ANY_WEIGHTS)
-    goals = bench.advertise(PoseStamped, 'next_view')
-    _, pose = camera_to_msgs(orbit_camera(0.5), Header())
-    said = 'refused: goal without a stamp: expected that of when it was published, got 0'
-    sent = 0
-    while not node.log(said):
-        assert sent < BUDGET_S / SEND_AGAIN_S
-        goals.publish(pose)  # the listener that was found may be of a node that has just ended
-        sent += 1
-        bench.within(SEND_AGAIN_S, lambda: node.log(said))
-    # A busy machine hears the first only after the second was sent
-    assert 1 <= bench.counts('reconstructor').get('refused/no_stamp', 1) <= sent
-    assert 'goals_unused' not in bench.counts('reconstructor')
-
-
 @pytest.fixture
 def turntable(start_node, box):
     return start_node('turntable_camera', mesh=box, time_scale=100.0)
@@ -219,14 +200,3 @@ def test_goals_that_are_not_finite_are_told_each_said_once_counted_and_survived(
     assert 'azimuth goal not finite: expected radians, got nan' in line
     ask(math.pi)
     bench.until(lambda: poses and poses[-1].pose.position.x < -1, 'the camera on the other side')
-
-
-def test_images_from_a_clock_that_is_far_ahead_are_warned_of(start_node, bench):
-    reconstructor = start_node('reconstructor', weights=ANY_WEIGHTS, take_views='all')
-    camera = FakeCamera(bench)
-    camera.show()
-    assert 'warned/clock_ahead' not in bench.counts('reconstructor')
-    camera.send(*camera.messages(bench.now() + 1_000_000_000_000))
-    bench.until(lambda: bench.counts('reconstructor').get('warned/clock_ahead'), 'the warning')
-    line, = reconstructor.log('stamped')
-    assert re.search('an image is stamped (999|1000) s from now: expected stamps of this', line)
