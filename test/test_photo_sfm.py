@@ -6,7 +6,7 @@ import sys
 import active_recon
 from active_recon.errors import ConfigError, DataError
 from active_recon.geometry.cameras import orbit_camera
-from active_recon.photos import sources
+from active_recon.photos import sources, structure_from_motion
 from active_recon.photos.files import open_photos, photo_paths
 from active_recon.photos.options import Options
 from active_recon.photos.sources import posed_by, SfmCameras
@@ -123,6 +123,13 @@ def test_photos_that_do_not_overlap_are_refused_with_what_to_do(tmp_path):
         sfm_photos(photos)
     with pytest.raises(DataError, match='got 0 of 2'):
         sfm_photos(photos[:2])
+
+
+def test_where_fewer_than_half_of_the_photos_fit_there_is_no_shape(photos, monkeypatch):
+    fit = {f'{number:05}.png': (np.eye(4), None) for number in range(5)}
+    monkeypatch.setattr(structure_from_motion, '_cameras', lambda *given: fit)
+    with pytest.raises(DataError, match='expected 6 photos or more .*, got 5 of 11'):
+        sfm_photos(photos)
 
 
 def test_what_asks_a_command_to_stop_is_heard_after_the_library_has_come():

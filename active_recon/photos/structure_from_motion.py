@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from itertools import count
+import math
 from pathlib import Path
 import signal
 from tempfile import TemporaryDirectory
@@ -25,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 FEWEST = 3
-"""Photos that have to fit together."""
+"""Photos that have to fit together, and half of all: fewer show a part, if they are right."""
 _WAYS = (('finding the cameras', False), ('finding more of the cameras', True))
 _NAME = 'structure from motion'
 _LONGEST = 1600  # pixels of a copy: more takes longer and hardly finds more
@@ -34,6 +35,8 @@ _AT_ONCE = 8  # copies that all cores work on together
 _INLIERS = {'init_min_num_inliers': 40, 'abs_pose_min_num_inliers': 15,
             'abs_pose_min_inlier_ratio': 0.15}
 """Fewer than COLMAP's own: it is made for photos of large places, with more to see in them."""
+_LENSES = {'min_focal_length_ratio': 0.4, 'max_focal_length_ratio': 10.0, 'max_extra_param': 0.5}
+"""What a camera has: beyond, photos were fitted together that do not belong so."""
 
 
 def sfm_photos(photos: Sequence[PhotoFile], reporting: Reporting = silent
@@ -44,7 +47,7 @@ def sfm_photos(photos: Sequence[PhotoFile], reporting: Reporting = silent
     The world's origin, axes and scale are arbitrary. Photos of one size and of one focal length
     by EXIF share a lens, which is estimated. Where some photos do not fit, all are tried again
     with features that are less sensitive to the side that they are seen from. Raises ConfigError
-    where pycolmap is not installed, DataError where fewer than FEWEST photos fit.
+    where pycolmap is not installed, DataError where fewer than FEWEST photos fit, or than half.
     """
     colmap = _library()
     found: Mapping[str, tuple[NDArray[np.float64], Lens]] = {}
@@ -56,9 +59,10 @@ def sfm_photos(photos: Sequence[PhotoFile], reporting: Reporting = silent
             found = max(found, cameras, key=len)
             if len(found) == len(copies):
                 break
-    if len(found) < FEWEST:
+    needed = max(FEWEST, math.ceil(len(copies) / 2))
+    if len(found) < needed:
         raise DataError(
-            f'{_NAME}: no cameras found: expected {FEWEST} photos or more that fit together, got '
+            f'{_NAME}: no cameras found: expected {needed} photos or more that fit together, got '
             f'{len(found)} of {len(photos)}; take 15 or more around the object, each at most 20 '
             'degrees from the one before, with the object on something finely patterned, such as '
             'a newspaper, or use --board', 'no_cameras')
@@ -146,8 +150,8 @@ def _cameras(colmap: Any, copies: Sequence[_Copy], folder: Path, own: Path, pati
     pairing.block_size = _AT_ONCE  # between blocks it hears that it is to stop
     colmap.match_exhaustive(database, matching, pairing, device=colmap.Device.cpu)
     mapping = colmap.IncrementalPipelineOptions()
-    for name, fewest in _INLIERS.items():
-        setattr(mapping.mapper, name, fewest)
+    for name, value in {**_INLIERS, **_LENSES}.items():
+        setattr(mapping.mapper, name, value)
     tried = count(done)  # of the same photo several times, perhaps
     models = colmap.incremental_mapping(
         database, folder, own, mapping,
