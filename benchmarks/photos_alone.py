@@ -35,6 +35,7 @@ from numpy.typing import NDArray
 from photo_table import around, centred, photographed, PRINT
 from PIL import Image
 from rich.progress import track
+from trimesh.registration import procrustes
 
 _PHOTOS, _USED = 24, 8
 _DISTANCE = 3 * SIZE
@@ -72,9 +73,9 @@ def _measured(model: Path, number: int) -> Mapping[str, Any]:
         took_s = time.monotonic() - began
         views, _ = load_views(even_choice(posed, _USED), None, lambda steps, note: None)
     at = [int(each.photo.path.stem) for each in posed]
-    true_from_found = _laid_over(
+    true_from_found, _, _ = procrustes(
         np.stack([each.pose[:3, 3] for each in posed]),
-        np.stack([cameras[count].position for count in at]))
+        np.stack([cameras[count].position for count in at]), reflection=False)
     off = [np.linalg.norm((true_from_found @ each.pose)[:3, 3] - cameras[count].position)
            for each, count in zip(posed, at, strict=True)]
     told = CameraFile('true', (), np.array([0.0, 0.0, 1.0]))
@@ -102,19 +103,6 @@ def _iou(views: Sequence[PhotoView], file: CameraFile, mesh: Any,
         return 0.0
     return iou_around(shape.occupancy > shape.threshold,
                       true_from_found @ shape.cube.world_from_object(1.0), mesh)
-
-
-def _laid_over(found: NDArray[np.float64], true: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the similarity, (4, 4), from places (N, 3) to the nearest others (Umeyama 1991)."""
-    here, there = found.mean(axis=0), true.mean(axis=0)
-    left, sizes, right = np.linalg.svd((true - there).T @ (found - here))
-    signs = np.array([1, 1, np.sign(np.linalg.det(left @ right))])
-    rotation = left * signs @ right
-    scale = (sizes * signs).sum() / ((found - here) ** 2).sum()
-    similarity = np.eye(4)
-    similarity[:3, :3] = scale * rotation
-    similarity[:3, 3] = there - scale * rotation @ here
-    return similarity
 
 
 def table(result: Mapping[str, Any]) -> Iterator[str]:

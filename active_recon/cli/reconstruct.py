@@ -124,6 +124,7 @@ def reconstruct(
     from active_recon.photos.options import Options
     from active_recon.photos.reconstruct import from_files
     from active_recon.photos.saving import FORMATS, of_earlier_run, save_shape
+    from active_recon.photos.sources import BoardCameras, SfmCameras, TurntableCameras
 
     if mesh_format not in FORMATS:
         raise ConfigError(f'--mesh-format: unknown value: expected {", ".join(FORMATS)}, got '
@@ -144,27 +145,20 @@ def reconstruct(
     if cameras is not None:
         sources.append(cameras)
     if board:
-        from active_recon.photos.sources import BoardCameras
-
         sources.append(BoardCameras(
             printed_board(squares, square_mm, marker_mm, dictionary), camera_info))
     if turntable_step_deg is not None:
-        from active_recon.photos.sources import TurntableCameras
-
         if distance is None:
             raise ConfigError('--turntable-step-deg needs --distance: give it in metres')
-        if axes is not None:
-            raise ConfigError('--axes with --turntable-step-deg: it is for a file of cameras')
         sources.append(TurntableCameras(
             math.radians(turntable_step_deg), math.radians(elevation_deg), distance,
             None if fov_deg is None else math.radians(fov_deg)))
     if sfm:
-        from active_recon.photos.sources import SfmCameras
-
         sources.append(SfmCameras())
-    if (board or sfm) and axes is not None:
-        raise ConfigError(f'--axes with --{"board" if board else "sfm"}: it is for a file of '
-                          'cameras')
+    for option, given in (('--board', board), ('--sfm', sfm),
+                          ('--turntable-step-deg', turntable_step_deg is not None)):
+        if given and axes is not None:
+            raise ConfigError(f'--axes with {option}: it is for a file of cameras')
     if out.resolve() == photos.resolve():
         raise ConfigError(f'--out: the folder of photos, {out}: its picture.png would be a photo '
                           'of the next run; give another folder')
