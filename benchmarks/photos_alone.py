@@ -20,12 +20,11 @@ from active_recon.errors import ActiveReconError
 from active_recon.geometry.cameras import Camera
 from active_recon.photos.camera_file import CameraFile
 from active_recon.photos.files import open_photos, photo_paths
-from active_recon.photos.integrating import even_choice
 from active_recon.photos.options import Options
 from active_recon.photos.reconstruct import from_views
 from active_recon.photos.shape import Shape
 from active_recon.photos.structure_from_motion import sfm_photos
-from active_recon.photos.views import load_views, PhotoView
+from active_recon.photos.views import even_choice, load_views, PhotoView
 from active_recon.volumes.meshes import load_mesh
 from benchmarks.photos_on_tables import interval, SIZE, some_models
 from benchmarks.studies import with_tables_between_marks

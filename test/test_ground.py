@@ -7,11 +7,10 @@ from active_recon.photos.conventions import looks_right
 from active_recon.photos.cube import Cube, upward
 from active_recon.photos.ground import BOARD_GROUND, Ground
 from active_recon.photos.ground_search import found_ground
-from active_recon.photos.integrating import even_choice
 from active_recon.photos.options import Options
 from active_recon.photos.reconstruct import from_views
 from active_recon.photos.saving import described
-from active_recon.photos.views import view_of
+from active_recon.photos.views import even_choice, view_of
 from active_recon.volumes.voxelisation import voxelise
 from active_recon.volumes.voxels import cell_centers, iou
 import numpy as np

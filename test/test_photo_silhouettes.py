@@ -18,9 +18,8 @@ from active_recon.photos.hull import (
     hull,
     seen_cells,
 )
-from active_recon.photos.integrating import even_choice
 from active_recon.photos.readers import LOOKS
-from active_recon.photos.views import PhotoView, view_of
+from active_recon.photos.views import even_choice, PhotoView, view_of
 from active_recon.volumes.object_box import object_box
 from active_recon.volumes.voxelisation import voxelise
 import numpy as np

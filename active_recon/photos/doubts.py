@@ -9,9 +9,9 @@ from active_recon.models.weights_files import DEFAULT_MODEL
 from active_recon.photos.conventions import conventions
 from active_recon.photos.cube import Cube
 from active_recon.photos.hull import coverage, depth_in_masks, hull
-from active_recon.photos.integrating import are_masked, COVERED, even_choice, integrate
+from active_recon.photos.integrating import are_masked, COVERED, integrate
 from active_recon.photos.shape import TakenView
-from active_recon.photos.views import PhotoView
+from active_recon.photos.views import even_choice, PhotoView
 from active_recon.reconstructor import Reconstructor
 from active_recon.volumes.better_cube import better_cube, box_text
 

@@ -29,6 +29,10 @@ class Ground:
         tops = cell_centers(side) @ normal + np.abs(normal).sum() / (2 * side)
         return np.asarray(self.height(cube.centre) + tops > 0).reshape(side, side, side)
 
+    def within(self, cube: Cube) -> 'Ground':
+        """Return the plane in the object frame of a cube, lengths in sides of the cube."""
+        return Ground(cube.rotation @ self.normal, -float(self.height(cube.centre)) / cube.side)
+
     def under(self, cube: Cube) -> Cube:
         """Return the cube, moved along the normal until its lowest corner is on the plane."""
         reach = np.abs(cube.rotation @ self.normal).sum() * cube.side / 2

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from active_recon.geometry.cameras import Camera
 from active_recon.photos.cube import shown_width, upright
 from active_recon.photos.ground import Ground
-from active_recon.photos.integrating import even_choice, SEARCHED_VIEWS
-from active_recon.photos.views import PhotoView
+from active_recon.photos.integrating import SEARCHED_VIEWS
+from active_recon.photos.views import even_choice, PhotoView
 import cv2
 import numpy as np
 from numpy.typing import NDArray

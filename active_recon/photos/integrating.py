@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 from active_recon.errors import DataError, ViewError
 from active_recon.geometry.cameras import Camera
@@ -13,7 +13,7 @@ from active_recon.photos.ground import Ground, no_table
 from active_recon.photos.hull import ceiling, coverage, depth_in_masks, hull, seen_cells
 from active_recon.photos.segmented_views import segmented_cells
 from active_recon.photos.shape import TakenView
-from active_recon.photos.views import PhotoView
+from active_recon.photos.views import even_choice, PhotoView
 from active_recon.reconstructor import Reconstructor
 from active_recon.segmentation import shipped_segmentation
 from active_recon.volumes.depth_images import DepthImage
@@ -25,7 +25,6 @@ from numpy.typing import NDArray
 COVERED = 0.95
 """Share of every mask that the hull covers where masks do not contradict each other."""
 _COVERED_PLAIN = 0.995  # of masks by colour: they lack what has the background's colour
-T = TypeVar('T')
 Advance = Callable[[int, str], None]
 SEARCHED_VIEWS = 8
 _ROUNDS = 4
@@ -155,12 +154,3 @@ def _box(box: NDArray[np.float64] | None, ground: Ground | None) -> NDArray[np.f
 def are_masked(views: Sequence[PhotoView]) -> bool:
     """Return whether every view has a mask."""
     return all(view.mask is not None for view in views)
-
-
-def even_choice(views: Sequence[T], count: int) -> list[T]:
-    """Return so many views at even steps, in their order; all where there are no more."""
-    if count >= len(views):
-        return list(views)
-    return [views[step * len(views) // count] for step in range(count)]
-
-

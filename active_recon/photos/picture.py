@@ -5,8 +5,8 @@ import math
 
 from active_recon.geometry.cameras import Camera
 from active_recon.geometry.canonical import framing_camera
-from active_recon.photos.integrating import even_choice
 from active_recon.photos.shape import Shape, TakenView
+from active_recon.photos.views import even_choice
 from active_recon.volumes.rendering import composite, Renderer
 import cv2
 import numpy as np

@@ -22,7 +22,6 @@ from active_recon.photos.integrating import (
     above_ground,
     are_masked,
     carved,
-    even_choice,
     found_cube,
     integrate,
 )
@@ -30,7 +29,7 @@ from active_recon.photos.options import Options
 from active_recon.photos.segmented_views import segmented_views
 from active_recon.photos.shape import Shape, TakenView
 from active_recon.photos.sources import posed_by, SfmCameras, Source, TurntableCameras
-from active_recon.photos.views import load_views, PhotoView, view_of
+from active_recon.photos.views import even_choice, load_views, PhotoView, view_of
 from active_recon.reconstructor import load, Reconstructor
 from active_recon.reporting import Reporting, silent
 from active_recon.runtimes import REMARK

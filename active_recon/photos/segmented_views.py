@@ -11,11 +11,13 @@ from active_recon.photos.cube import Cube
 from active_recon.photos.ground import Ground
 from active_recon.photos.seen_photo import SeenPhoto
 from active_recon.photos.silhouette_fusion import CELLS, segmented_silhouettes
+from active_recon.photos.table_evidence import above_table
 from active_recon.photos.views import PhotoView
 from active_recon.segmentation import FramedShares, on_white_by, Segmentation
 import numpy as np
 from numpy.typing import NDArray
 
+_UNIT_CUBE = Cube(np.zeros(3), 1.0, np.array([0.0, 0.0, 1.0]))
 _UNKNOWN = np.float32(0.5)  # the object's share of pixels that no photo has
 
 
@@ -32,8 +34,7 @@ def segmented_views(views: Sequence[PhotoView], cube: Cube, segmentation: Segmen
             found.append((view, segmentation.framed(view.image, cube.camera(view.camera, 1.0))))
         except ViewError as error:
             left_out.append(f'{view.name}: {error}')
-    agreed = agreed_shares([framed for _, framed in found],
-                           None if ground is None else ground.above(cube, CELLS))
+    agreed = agreed_shares([framed for _, framed in found], _within(ground, cube))
     shown = []
     for (view, framed), share in zip(found, agreed, strict=True):
         if share.max() <= _UNKNOWN:
@@ -58,24 +59,27 @@ def segmented_cells(views: Sequence[PhotoView], cube: Cube, segmentation: Segmen
     for view in views:
         with suppress(ViewError):
             found.append(segmentation.framed(view.image, cube.camera(view.camera, 1.0)))
-    above = None if ground is None else ground.above(cube, CELLS)
     if not found:
         return np.zeros((CELLS,) * 3, np.bool_), [], []
-    shares, cells = _agreed(found, above)
+    shares, cells = _agreed(found, _within(ground, cube))
     return cells, [share > _UNKNOWN for share in shares], [each.camera for each in found]
 
 
-def agreed_shares(framed: Sequence[FramedShares], above: NDArray[np.bool_] | None = None
+def agreed_shares(framed: Sequence[FramedShares], table: Ground | None = None
                   ) -> list[NDArray[np.float32]]:
     """
     Return the object's share in each pixel, (S, S) each, that framed images agree on.
 
-    Only the cells of the cube, (C, C, C), that are `above` a ground may be the object.
+    `table` is what the object stands on, in the object frame, lengths in sides of the cube.
     """
-    return _agreed(framed, above)[0] if framed else []
+    return _agreed(framed, table)[0] if framed else []
 
 
-def _agreed(framed: Sequence[FramedShares], above: NDArray[np.bool_] | None
+def _within(ground: Ground | None, cube: Cube) -> Ground | None:
+    return None if ground is None else ground.within(cube)
+
+
+def _agreed(framed: Sequence[FramedShares], table: Ground | None
             ) -> tuple[list[NDArray[np.float32]], NDArray[np.bool_]]:
     """Return the shares and the cells, (C, C, C), that framed images agree on."""
     photos = []
@@ -84,4 +88,8 @@ def _agreed(framed: Sequence[FramedShares], above: NDArray[np.bool_] | None
         seen = (np.full(image.shape[:2], True) if each.image.shape[2] == 3
                 else each.image[..., 3] > 127)
         photos.append(SeenPhoto(each.camera, image, image, seen, np.zeros_like(image)))
-    return segmented_silhouettes(photos, [each.shares for each in framed], above)
+    above = evidence = None
+    if table is not None:
+        above = table.above(_UNIT_CUBE, CELLS)
+        evidence = above_table(photos, table)
+    return segmented_silhouettes(photos, [each.shares for each in framed], above, evidence)

@@ -94,14 +94,16 @@ def silhouettes(photos: Sequence[SeenBoard], cube: Cube, least_share: float
 
 
 def segmented_silhouettes(photos: Sequence[SeenPhoto], shares: Sequence[NDArray[np.float32]],
-                          above: NDArray[np.bool_] | None = None
+                          above: NDArray[np.bool_] | None = None,
+                          evidence: Sequence[Logits] | None = None
                           ) -> tuple[list[NDArray[np.float32]], NDArray[np.bool_]]:
     """
     Return the object's share in each pixel, (H, W) in [0, 1] each, and its cells, (S, S, S).
 
     `shares` are those of a segmenter. The cameras are in the object frame, lengths in sides of the
     cube. Pixels that are not `known`, which the camera did not see, tell nothing. Only the cells
-    `above` a ground may be the object; None: all may.
+    `above` a ground may be the object; None: all may. `evidence` are further log odds of each
+    pixel, (H, W) each.
     """
     may_be = np.full(CELLS ** 3, True) if above is None else above.ravel()
     places = [_place(photo.camera, may_be) for photo in photos]
@@ -109,6 +111,9 @@ def segmented_silhouettes(photos: Sequence[SeenPhoto], shares: Sequence[NDArray[
               for photo, place in zip(photos, places, strict=True)]
     sure = [share.clip(_LEAST_SHARE, 1 - _LEAST_SHARE) for share in shares]
     logits = [np.log(share / (1 - share)) for share in sure]
+    if evidence is not None:
+        logits = [logit + np.clip(further, -_MOST, _MOST)
+                  for logit, further in zip(logits, evidence, strict=True)]
 
     def by_both(found: Sequence[NDArray[np.float32]]) -> list[Logits]:
         of_object, of_rest = (_colors(photos, [part & photo.known for part, photo in zip(

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from active_recon.errors import DataError
 from active_recon.file_names import comparable
@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+T = TypeVar('T')
 _SEE_THROUGH = 250  # alpha below which a photo has an alpha channel worth the name
 _EMPTY_SHARE = 0.02
 _FULL = (1, 255, 65535)  # the object in masks of labels, of 8 and of 16 bits
@@ -206,3 +207,10 @@ def _mask(path: Path, width: int, height: int,
         raise DataError(f'{path}: empty mask: expected an object, brighter than {full / 2:g} of '
                         f'{full}, got at most {grey.max():g}')
     return found
+
+
+def even_choice(views: Sequence[T], count: int) -> list[T]:
+    """Return so many views at even steps, in their order; all where there are no more."""
+    if count >= len(views):
+        return list(views)
+    return [views[step * len(views) // count] for step in range(count)]
