@@ -1,5 +1,6 @@
 """Photos of which nothing is known: COLMAP finds their cameras, and they give a shape."""
 
+import json
 import subprocess
 import sys
 
@@ -17,7 +18,7 @@ import cv2
 import numpy as np
 from photo_scene import thing
 from photo_table import centred, LENS, photographed, PRINT
-from PIL import ExifTags, Image
+from PIL import ExifTags, Image, ImageOps
 import pytest
 import trimesh
 
@@ -167,3 +168,23 @@ def test_the_command_takes_one_way_to_find_cameras(folder, monkeypatch, capsys):
     assert 'several of --cameras, --board, --turntable-step-deg and --sfm' in said
     said = refusal(monkeypatch, capsys, 'reconstruct', folder, '--sfm', '--axes', 'opengl')
     assert '--axes with --sfm: it is for a file of cameras' in said
+
+
+@pytest.mark.slow
+def test_a_video_around_the_object_gives_a_mesh_as_photos_do(
+        folder, tmp_path, monkeypatch, capsys):
+    writer = cv2.VideoWriter(str(tmp_path / 'walk.avi'), cv2.VideoWriter_fourcc(*'MJPG'), 10.0,
+                             (WIDTH, HEIGHT))
+    for number in range(COUNT):
+        with Image.open(folder / f'p{number:02}.jpg') as photo:
+            frame = np.asarray(ImageOps.exif_transpose(photo))[..., ::-1]
+        for sigma in (3, 0, 3):  # the hand moves before and after
+            writer.write(cv2.GaussianBlur(frame, (0, 0), sigma) if sigma else frame)
+    writer.release()
+    assert command(monkeypatch, 'reconstruct', tmp_path / 'walk.avi', '--sfm', '--frames', COUNT,
+                   '--size', SIZE, '--out', tmp_path / 'out') == 0
+    told = json.loads((tmp_path / 'out' / 'shape.json').read_text())
+    assert [each['photo'] for each in told['views']] == [
+        f'walk-{3 * number + 1:05}.png' for number in range(COUNT)]
+    mesh = trimesh.load(tmp_path / 'out' / 'mesh.ply', process=False)
+    assert 0.8 * SIZE < mesh.extents.max() < 1.2 * SIZE

@@ -74,6 +74,18 @@ def open_source(place: str, width: int = 0, height: int = 0, rate: float = 0.0) 
     return _Film(path, rate)
 
 
+def frame_count(path: Path) -> int:
+    """Return how many images a video file has: as it says, or counted where it does not."""
+    capture = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
+    try:
+        count = max(0, int(capture.get(cv2.CAP_PROP_FRAME_COUNT)))
+        while not count and capture.grab():
+            return 1 + sum(1 for _ in iter(capture.grab, False))
+        return count
+    finally:
+        capture.release()
+
+
 def fitting_lens(lens: Intrinsics, size: tuple[int, int], where: str) -> Intrinsics:
     """Return a lens if it is that of images of a size; raises DataError where it is not."""
     if (lens.width, lens.height) != size:

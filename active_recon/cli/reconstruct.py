@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 def reconstruct(
     context: typer.Context,
     photos: Annotated[Path, typer.Argument(
-        help='Folder of photos.', show_default=False)],
+        help='Folder of photos; or a video around the object, with --sfm or --board.',
+        show_default=False)],
     out: Annotated[Path, typer.Option(
         help='Folder for mesh, voxels, picture and shape.json.')] = Path('reconstruction'),
     cameras: Annotated[Path | None, typer.Option(
@@ -79,6 +80,9 @@ def reconstruct(
              'object.')] = None,
     views: Annotated[int | None, typer.Option(
         min=1, help='Use so many photos at even steps; default: all.')] = None,
+    frames: Annotated[int | None, typer.Option(
+        min=1, help='With a video: take so many frames, the sharpest of parts of equal length; '
+                    'default: 36, one every ten degrees.')] = None,
     order: Annotated[str, typer.Option(
         help='Order of the photos: name, or time (when they were taken, by EXIF).')] = 'name',
     mesh_format: Annotated[str, typer.Option(
@@ -107,7 +111,7 @@ def reconstruct(
                               'as much of IoU.')] = 0.005,
 ) -> None:
     """
-    Reconstruct an object from a folder of photos.
+    Reconstruct an object from a folder of photos, or from a video.
 
     No ROS runs, nothing has to be cropped, and masks are not needed. The cameras come from a file,
     from a printed board in the photos, from the steps of a turntable, or from the photos alone.
@@ -119,12 +123,15 @@ def reconstruct(
 
     Example: active-recon reconstruct photos/ --sfm --size 0.2
 
+    Example: active-recon reconstruct film.mp4 --sfm --size 0.2
+
     Example: active-recon reconstruct photos/ --watch --board --lan
     """
-    from active_recon.photos.options import Options
+    from active_recon.photos.options import FRAMES, Options
     from active_recon.photos.reconstruct import from_files
     from active_recon.photos.saving import FORMATS, of_earlier_run, save_shape
     from active_recon.photos.sources import BoardCameras, SfmCameras, TurntableCameras
+    from active_recon.photos.video_frames import is_video
 
     if mesh_format not in FORMATS:
         raise ConfigError(f'--mesh-format: unknown value: expected {", ".join(FORMATS)}, got '
@@ -159,6 +166,7 @@ def reconstruct(
                           ('--turntable-step-deg', turntable_step_deg is not None)):
         if given and axes is not None:
             raise ConfigError(f'--axes with {option}: it is for a file of cameras')
+    refuse_lone(context, 'a video', is_video(photos), 'frames')
     if out.resolve() == photos.resolve():
         raise ConfigError(f'--out: the folder of photos, {out}: its picture.png would be a photo '
                           'of the next run; give another folder')
@@ -170,7 +178,8 @@ def reconstruct(
                           'one of them')
     source = sources[0] if sources else None
     options = Options(None if box is None else box_numbers(box), unit, size, up, axes, background,
-                      masks, views, model, order=order, ground=ground)
+                      masks, views, model, order=order, ground=ground,
+                      frames=FRAMES if frames is None else frames)
     if watch:
         from active_recon.cli.watch_photos import Pages, watch_photos
         from active_recon.policies.stopping import StoppingRule

@@ -10,6 +10,9 @@ from active_recon.models.weights_files import DEFAULT_MODEL
 from active_recon.photos.backgrounds import BACKGROUNDS
 import numpy as np
 
+FRAMES = 36
+"""Of a video, unless told: around an object one every ten degrees."""
+
 
 @dataclass(frozen=True)
 class Options:
@@ -26,6 +29,7 @@ class Options:
     - background: one of BACKGROUNDS; masks: a folder of masks, for `auto`
     - views: how many photos at even steps are used; None: all
     - order: of the photos, one of ORDERS
+    - frames: how many of a video's are taken for photos
     - ground: whether the table under the object is searched in the photos
     - model: a model that ships by its name, or a weights file; threads: of the CPU
 
@@ -44,6 +48,7 @@ class Options:
     threads: int | None = 1
     order: str = 'name'
     ground: bool = True
+    frames: int = FRAMES
 
     def __post_init__(self) -> None:
         """Reject what cannot be, before any photo is read."""
@@ -56,6 +61,7 @@ class Options:
         for name, value, kind, expected in (
                 ('unit', self.unit, Real, 'metres'), ('size', self.size, Real, 'metres'),
                 ('views', self.views, Integral, 'a whole number'),
+                ('frames', self.frames, Integral, 'a whole number'),
                 ('threads', self.threads, Integral, 'a whole number')):
             if value is not None and not isinstance(value, kind):
                 raise ConfigError(f'{name}: no number: expected {expected}, got {value!r}')
@@ -66,5 +72,6 @@ class Options:
                 isinstance(value, Real) for value in self.box)):
             raise ConfigError('box: expected four numbers, the centre x, y, z and the side, got '
                               f'{self.box!r}')
-        if self.views is not None and self.views < 1:
-            raise ConfigError(f'views: out of range: expected 1 or more, got {self.views}')
+        for name, count in (('views', self.views), ('frames', self.frames)):
+            if count is not None and count < 1:
+                raise ConfigError(f'{name}: out of range: expected 1 or more, got {count}')

@@ -25,10 +25,17 @@ from active_recon.photos.integrating import (
     found_cube,
     integrate,
 )
-from active_recon.photos.options import Options
+from active_recon.photos.options import FRAMES, Options
 from active_recon.photos.segmented_views import segmented_views
 from active_recon.photos.shape import Shape, TakenView
-from active_recon.photos.sources import posed_by, SfmCameras, Source, TurntableCameras
+from active_recon.photos.sources import (
+    posed_by,
+    require_found,
+    SfmCameras,
+    Source,
+    TurntableCameras,
+)
+from active_recon.photos.video_frames import frames_of, is_video
 from active_recon.photos.views import even_choice, load_views, PhotoView, view_of
 from active_recon.reconstructor import load, Reconstructor
 from active_recon.reporting import Reporting, silent
@@ -52,20 +59,21 @@ def reconstruct(images: Path | str | Sequence[Path | str | NDArray[np.uint8]],
                 box: Sequence[float] | None = None, unit: float = 1.0, up: str | None = None,
                 views: int | None = None, model: str | Path = DEFAULT_MODEL,
                 threads: int | None = 1, order: str = 'name', axes: str | None = None,
-                ground: bool = True) -> Shape:
+                ground: bool = True, frames: int = FRAMES) -> Shape:
     """
     Reconstruct an object from photos of known cameras.
 
-    `images` is a folder, a list of files, or of pixels, (H, W, 3 or 4) uint8 RGB(A). `cameras` is
-    a file in one of the known formats (None: the one beside the photos), another `Source`, or a
-    camera for each image in the object frame, whose origin is the centre of the object's cube.
+    `images` is a folder, a video, a list of files, or of pixels, (H, W, 3 or 4) uint8 RGB(A).
+    `cameras` is a file in one of the known formats (None: the one beside the photos), another
+    `Source`, or a camera for each image in the object frame, whose origin is the centre of the
+    object's cube.
     `size` is the side of that cube in metres. With a camera file it only sets the scale, and the
     cube is found unless `box` (x, y, z, side, in the file's units) or the file tells it. The rest
     is as in `Options`; `masks`, `unit` (instead of `size`) and `order` are for files alone, `axes`
     for those of cameras. Raises ActiveReconError where no photo can be used.
     """
     options = Options(box, unit, size, up, axes, background, None if masks is None else
-                      Path(masks), views, model, threads, order, ground)
+                      Path(masks), views, model, threads, order, ground, frames)
     if isinstance(cameras, str):
         cameras = Path(cameras)
     if cameras is not None and not isinstance(cameras, Source):
@@ -90,11 +98,15 @@ def reconstruct(images: Path | str | Sequence[Path | str | NDArray[np.uint8]],
 def from_files(place: Path | Sequence[Path], source: Source | None, options: Options = _DEFAULTS,
                reporting: Reporting = silent) -> Shape:
     """
-    Reconstruct from photos, a folder or files, whose cameras are found as in `posed_by`.
+    Reconstruct from photos, a folder, a video or files, whose cameras are found as in `posed_by`.
 
     By structure from motion no scale is known: without a size the cube's side is 1 m, which a
     warning says. Raises ActiveReconError where no photo can be used.
     """
+    if is_video(place):
+        require_found(source, options.masks)
+        with frames_of(place, options.frames, reporting) as folder:
+            return from_files(folder, source, options, reporting)
     is_scaled = not isinstance(source, SfmCameras) or options.size is not None
     if isinstance(source, SfmCameras):
         _require_no_lengths(options)

@@ -78,6 +78,16 @@ def posed_by(source: Source | None, photos: Sequence[PhotoFile], axes: str | Non
     return file, posed, left_out
 
 
+def require_found(source: Source | None, masks: Path | None) -> None:
+    """Raise ConfigError on what is looked up by names of photos, which frames do not have."""
+    if not isinstance(source, BoardCameras | SfmCameras):
+        raise ConfigError('cameras of a video: expected a board in it or structure from motion, '
+                          'which find them in its frames: --board or --sfm, in Python '
+                          'BoardCameras or SfmCameras')
+    if masks is not None:
+        raise ConfigError('masks with a video: its frames have no names to find masks by')
+
+
 def place_of_cameras(source: Path | None, folder: Path) -> Path | None:
     """Return the file or folder of the cameras of photos in a folder; None where none is found."""
     return source or find_cameras([folder, folder.parent])
