@@ -1,5 +1,6 @@
 """Photos tell what is the table under an object: there they show the same in its plane."""
 
+from active_recon.geometry.cameras import orbit_camera
 from active_recon.geometry.canonical import framed_image
 from active_recon.photos.cube import Cube
 from active_recon.photos.ground import Ground
@@ -81,6 +82,17 @@ def test_one_photo_alone_and_what_no_photo_has_tell_nothing(scene, table):
     told = above_table([hidden, *photos[1:]], table)
     np.testing.assert_allclose(told[0], 0, atol=1e-6)
     assert told[1].max() > 1
+
+
+@pytest.mark.parametrize('height', [-0.2, 0.0, 0.04, 0.5])
+def test_a_camera_may_be_as_low_as_the_table_or_lower_than_the_cube_s_top(height, scene, table):
+    photos, _ = scene
+    camera = orbit_camera(1.0, np.arcsin((table.level + height) / 3), 3.0,
+                          photos[0].camera.intrinsics)
+    low = SeenPhoto(camera, photos[0].image, photos[0].even, photos[0].known, photos[0].expected)
+    told = above_table([low, *photos[1:]], table)
+    assert all(np.isfinite(each).all() for each in told) and told[1].max() > 1
+    assert bool(told[0].any()) == (height > 0.04)
 
 
 def test_the_order_of_photos_that_are_all_compared_does_not_matter(scene, table):

@@ -32,6 +32,7 @@ _NOTHING = np.float32(np.log(_HIDDEN) + _UNIFORM)
 _WEIGHT = 0.8  # of a photo: their mistakes are alike
 _WINDOW = 3  # pixels that show the same place, as a rule
 _FLAT = -1e-3  # rays that sink less do not meet the table where any photo shows it
+_CLEAR = 0.01  # of a camera above a plane, in sides of the cube
 _NEXT = np.ones((3, 3), np.uint8)
 Levels = NDArray[np.float32]
 
@@ -69,6 +70,10 @@ def _compared(photo: SeenPhoto) -> _Compared:
 def _evidence(one: _Compared, others: Sequence[_Compared], table: Ground, planes: Sequence[Ground]
               ) -> NDArray[np.float64]:
     """Return the log odds, (H, W), that others show what a photo's pixels do in planes above."""
+    position = one.camera.position
+    planes = [plane for plane in planes if plane.height(position) > _CLEAR]
+    if not planes:
+        return np.zeros(one.levels.shape[:2])
     rays = one.camera.ray_directions().reshape(*one.levels.shape[:2], 3)
     sinking = np.minimum(rays @ table.normal, _FLAT)
     ahead = np.zeros((len(planes), *sinking.shape), np.float32)
@@ -77,8 +82,8 @@ def _evidence(one: _Compared, others: Sequence[_Compared], table: Ground, planes
         for height, plane in enumerate(planes):
             ahead[height] += np.nan_to_num(_likelihood(one, other, plane) - in_table)
     ahead = _WEIGHT * np.stack([cv2.blur(each, (_WINDOW, _WINDOW)) for each in ahead])
-    inside = np.stack([_is_inside(one.camera.position - (
-        plane.height(one.camera.position) / sinking)[..., None] * rays) for plane in planes])
+    inside = np.stack([_is_inside(position - (plane.height(position) / sinking)[..., None] * rays)
+                       for plane in planes])
     odds = logsumexp(ahead, axis=0, b=inside) - np.log(np.maximum(inside.sum(axis=0), 1))
     return np.where(inside.any(axis=0), odds, 0.0)
 
@@ -94,10 +99,11 @@ def _likelihood(one: _Compared, other: _Compared, plane: Ground) -> Levels:
 
     It is NaN where one of them does not show the place in the plane.
     """
-    apart = one.levels - _carried(other, one, plane)
-    step = np.maximum(one.levels[..., 3], one.levels[..., 3] - apart[..., 3])
+    shown = _carried(other, one, plane)
+    apart = one.levels[..., :3] - shown[..., :3]
+    step = np.maximum(one.levels[..., 3], shown[..., 3])
     variance = 2 * _NOISE ** 2 + (_OF_STEP * step) ** 2
-    density = -0.5 * (np.einsum('hwc,hwc->hw', apart[..., :3], apart[..., :3]) / variance
+    density = -0.5 * (np.einsum('hwc,hwc->hw', apart, apart) / variance
                       + 3 * np.log(2 * np.pi * variance))
     return np.asarray(np.maximum(np.log(1 - _HIDDEN) + density, _NOTHING), np.float32)
 
