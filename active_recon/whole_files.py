@@ -14,16 +14,20 @@ def whole_file(path: Path) -> Iterator[Path]:
     """
     Yield a path beside another, whose place the file there takes once the block has ended.
 
-    If the block raises, what stood at `path` stays, and nothing is left beside it.
+    If the block raises, what stood at `path` stays, and nothing is left beside it. An OSError of
+    writing, as of a full disk, names `path`.
     """
     # A name of its own: two processes may write the same file at once
     unfinished = path.with_name(f'.{path.name}.{token_hex(4)}.part')
     try:
         yield unfinished
         unfinished.replace(path)
-    except BaseException:
+    except BaseException as error:
         with suppress(OSError):
             unfinished.unlink(missing_ok=True)
+        if isinstance(error, OSError) and error.filename in (None, str(unfinished)) and (
+                error.filename2 is None):
+            error.filename = str(path)
         raise
 
 

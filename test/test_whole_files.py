@@ -40,6 +40,19 @@ def test_what_fails_leaves_what_stood_there_and_nothing_beside_it(tmp_path, erro
     assert list(tmp_path.iterdir()) == [path]
 
 
+def test_a_disk_without_room_is_told_with_the_name_of_the_file(tmp_path):
+    path = tmp_path / 'it.json'
+    with pytest.raises(OSError, match=f'No space left on device: {str(path)!r}'), (
+            whole_file(path)), open('/dev/full', 'w') as full:
+        full.write('what has no room')
+
+
+def test_a_folder_that_is_gone_is_told_with_the_name_of_the_file_that_was_to_be_in_it(tmp_path):
+    path = tmp_path / 'gone' / 'it.json'
+    with pytest.raises(FileNotFoundError, match=f'{str(path)!r}$'), whole_file(path) as unfinished:
+        unfinished.write_text('what has no place')
+
+
 def test_the_folder_of_a_file_is_made_and_nothing_in_it(tmp_path):
     path = tmp_path / 'new' / 'it.json'
     assert writable(path) == path
