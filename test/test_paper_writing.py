@@ -14,6 +14,7 @@ from active_recon.paper.study import Objects, Study
 from active_recon.paper.writing import is_current, provenance, read_result, write_result
 from active_recon.reporting import silent
 import numpy as np
+from PIL import Image
 import pytest
 
 OWN = Column('IoU', [Interval(0.5, 0.4, 0.6), None, 0.25])
@@ -83,6 +84,20 @@ def test_a_result_that_is_no_json_is_made_again_and_cannot_be_read(study):
     assert not is_current(study, 'table9', INPUTS)
     with pytest.raises(DataError, match='`active-recon paper table9`'):
         read_result(study, 'table9')
+
+
+def test_a_result_whose_writing_is_interrupted_leaves_the_files_of_the_one_before(
+        study, monkeypatch):
+    def interrupted(picture, path, *given, **more):
+        Path(path).write_bytes(b'half of it')
+        raise KeyboardInterrupt
+
+    write_result(study, 'table9', INPUTS, result())
+    before = {path: path.read_bytes() for path in study.out.iterdir()}
+    monkeypatch.setattr(Image.Image, 'save', interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        write_result(study, 'table9', INPUTS, result('Another table'))
+    assert {path: path.read_bytes() for path in study.out.iterdir()} == before
 
 
 def test_the_same_result_is_the_same_files(study, tmp_path):

@@ -8,6 +8,7 @@ from active_recon.paper.parts import PARTS
 from active_recon.paper.results import Claim, PUBLISHED
 from active_recon.paper.study import Study
 from active_recon.paper.writing import body, claims_of, read_result
+from active_recon.whole_files import whole_file
 
 _INTRODUCTION = f"""\
 # The paper's tables and figures, measured here
@@ -45,7 +46,8 @@ def write_document(study: Study) -> bool:
     path = study.out / 'README.md'
     if path.is_file() and path.read_text() == text:
         return False
-    path.write_text(text)
+    with whole_file(path) as unfinished:
+        unfinished.write_text(text)
     return True
 
 

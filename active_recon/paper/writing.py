@@ -12,6 +12,7 @@ from active_recon.paper.claims import sentences
 from active_recon.paper.results import Claim, Result
 from active_recon.paper.study import Objects, Study
 from active_recon.paper.trainings import views_seen
+from active_recon.whole_files import whole_file
 from PIL import Image
 
 Inputs = Mapping[str, Any]
@@ -61,17 +62,20 @@ def is_current(study: Study, name: str, inputs: Inputs) -> bool:
 
 
 def write_result(study: Study, name: str, inputs: Inputs, result: Result) -> None:
-    """Write a part's three files, JSON last, so that an interrupted part is made again."""
+    """Write a part's three files, which take their places once all are whole, JSON last."""
     study.out.mkdir(parents=True, exist_ok=True)
     command = study.command(name)
-    Image.fromarray(result.picture).save(study.out / f'{name}.png', optimize=True)
-    (study.out / f'{name}.md').write_text(_markdown(name, command, inputs, result))
     content = {'title': result.title, 'command': command, 'inputs': dict(inputs),
                'tables': [table.to_dict() for table in result.tables],
                'claims': [{'claim': claim.claim, 'verdict': claim.verdict,
                            'because': claim.because} for claim in result.claims],
                'figures': dict(result.figures)}
-    (study.out / f'{name}.json').write_text(json.dumps(content, indent=1) + '\n')
+    figures, page, picture = (study.out / f'{name}{suffix}' for suffix in _SUFFIXES)
+    with (whole_file(figures) as json_file, whole_file(page) as markdown,
+          whole_file(picture) as png):
+        json_file.write_text(json.dumps(content, indent=1) + '\n')
+        markdown.write_text(_markdown(name, command, inputs, result))
+        Image.fromarray(result.picture).save(png, 'PNG', optimize=True)
 
 
 def body(study: Study, name: str) -> str:
