@@ -75,16 +75,28 @@ def test_a_loaded_network_answers_as_the_one_that_was_saved(saved, network):
     assert_close(found.logits, expected.logits, rtol=0, atol=0.01)
 
 
-@pytest.mark.parametrize('write', [
+WRITERS = pytest.mark.parametrize('write', [
     lambda path, bundle: save_weights(path, bundle),
     lambda path, _: save_scorer(
         path, ViewScorer.from_config(ScorerConfig()), ScorerConfig(), 'a' * 64, {})],
     ids=['network', 'policy'])
+
+
+@WRITERS
 def test_weights_are_written_whole_or_those_before_stay(write, saved, network, tiny):
     before = {path: path.read_bytes() for path in saved.parent.iterdir()}
     with small_disk(1000), pytest.raises(OSError):
         write(saved, Bundle(network, None, tiny, 0.5))
     assert {path: path.read_bytes() for path in saved.parent.iterdir()} == before
+
+
+@WRITERS
+def test_weights_whose_card_cannot_be_written_are_not_written(write, network, tiny, tmp_path):
+    card = tmp_path / 'weights.json'
+    card.mkdir()
+    with pytest.raises(OSError, match=card.name):
+        write(card.with_suffix('.safetensors'), Bundle(network, None, tiny, 0.5))
+    assert list(tmp_path.iterdir()) == [card]
 
 
 def test_loaded_networks_are_frozen_and_in_float32(saved):

@@ -48,19 +48,19 @@ class Companion(Generic[Module]):
         """
         Write `path` (.safetensors) for a network's weights, or any, and the card beside it.
 
-        The file appears whole.
+        Both appear whole, the card first.
         """
         path.parent.mkdir(parents=True, exist_ok=True)
         belongs_to = {} if network_sha256 is None else {'network_sha256': network_sha256}
         dtype = torch.float16 if self.half else torch.float32
         tensors = {name: in_precision(dtype, tensor.detach().cpu()).contiguous()
                    for name, tensor in module.state_dict().items()}
-        with whole_file(path) as unfinished:
+        with whole_file(path) as unfinished, whole_file(path.with_suffix('.json')) as told:
             unfinished.write_bytes(weights_bytes(tensors, {
                 'model': self.kind, 'config': json.dumps(config.to_dict()), **belongs_to}))
-        path.with_suffix('.json').write_text(json.dumps({
-            'model': self.kind, 'config': config.to_dict(), **belongs_to,
-            'sha256': weights_hash(path), **card}, indent=2) + '\n')
+            told.write_text(json.dumps({
+                'model': self.kind, 'config': config.to_dict(), **belongs_to,
+                'sha256': weights_hash(unfinished), **card}, indent=2) + '\n')
 
     def is_kind(self, path: Path) -> bool:
         """Return whether a file calls itself one of this kind; False where it cannot be read."""

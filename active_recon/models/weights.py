@@ -40,8 +40,8 @@ def save_weights(path: Path, bundle: Bundle) -> None:
     """
     Write `path` (.safetensors) and the card beside it (.json).
 
-    Floats are stored in half precision, but for tensors with numbers too large for it. The file
-    appears whole.
+    Floats are stored in half precision, but for tensors with numbers too large for it. Both appear
+    whole, the card first.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     tensors = {f'{part}.{name}': in_precision(torch.float16, tensor.detach().cpu()).contiguous()
@@ -49,13 +49,13 @@ def save_weights(path: Path, bundle: Bundle) -> None:
                for name, tensor in module.state_dict().items()}
     config = json.dumps(bundle.config.to_dict())
     # Written here: safetensors itself writes for the owner alone
-    with whole_file(path) as unfinished:
+    with whole_file(path) as unfinished, whole_file(path.with_suffix('.json')) as card:
         unfinished.write_bytes(weights_bytes(tensors, {
             'model': bundle.model, 'config': config, 'threshold': repr(bundle.threshold)}))
-    card = {'model': bundle.model, 'config': bundle.config.to_dict(),
+        card.write_text(json.dumps({
+            'model': bundle.model, 'config': bundle.config.to_dict(),
             'threshold': bundle.threshold,
-            'sha256': weights_hash(path), **bundle.card}
-    path.with_suffix('.json').write_text(json.dumps(card, indent=2) + '\n')
+            'sha256': weights_hash(unfinished), **bundle.card}, indent=2) + '\n')
 
 
 def load_weights(path: Path | None = None, device: str = 'cpu') -> Bundle:
