@@ -8,11 +8,13 @@ import math
 import shutil
 
 from active_recon.cli.bf16_option import trained_in_bf16
+from active_recon.errors import DataError
 from active_recon.models.network_2d3d import SIZES
 from active_recon.models.weights import load_weights
 from active_recon.models.weights_files import PAPER_MODEL, weights_hash
 from command_line import command, refusal
 import pytest
+from recorded_messages import small_disk
 from safetensors.torch import load_file
 from small_datasets import lamps_and_tables
 import torch
@@ -156,6 +158,20 @@ def test_a_training_that_is_interrupted_says_where_and_how_to_go_on(
     assert 'stopped at step 2 of 3; continue with --resume' in capsys.readouterr().out
     monkeypatch.undo()
     assert command(monkeypatch, *asked, '--resume') == 0
+
+
+def test_a_log_without_room_is_told_in_words_alone(tmp_path, monkeypatch):
+    import threading
+
+    from active_recon.cli.training_log import SummaryLog
+
+    failed = []
+    monkeypatch.setattr(threading, 'excepthook', failed.append)
+    with (small_disk(1000), pytest.raises(DataError, match='a folder with room.*--resume'),
+          SummaryLog(tmp_path, None) as log, log.reporting('policy', 99) as report):
+        for step in range(1, 99):
+            report(step, {'loss': 0.5})
+    assert not failed
 
 
 @pytest.mark.slow

@@ -1,12 +1,14 @@
 """The log of a training: a progress bar, and TensorBoard's curves and images."""
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
+import threading
 from types import TracebackType
 from typing import TYPE_CHECKING
 
 from active_recon.cli.progress import progress_bar
+from active_recon.errors import DataError
 from active_recon.reporting import by_step
 from torch.utils.tensorboard import SummaryWriter
 
@@ -20,19 +22,22 @@ class SummaryLog:
     A log in a folder; a resumed training overwrites the steps after its checkpoint.
 
     After every validation the network's prediction of some of the `shown` objects is logged.
+    Raises DataError where the log cannot be written.
     """
 
     def __init__(self, folder: Path, shown: 'ViewSet') -> None:
         self._folder, self._shown = folder, shown
         self._writers: dict[str, SummaryWriter] = {}
+        self._hook = threading.excepthook
 
     def show(self, stage: str, step: int, network: 'ReconstructionNetwork') -> None:
         """Log an image of the network's predictions after a number of steps."""
         from active_recon.training.pictures import progress_picture
 
-        self._writer(stage, step).add_image(
-            f'{stage}/validation', progress_picture(network, self._shown), step,
-            dataformats='HWC')
+        with self._writing():
+            self._writer(stage, step).add_image(
+                f'{stage}/validation', progress_picture(network, self._shown), step,
+                dataformats='HWC')
 
     @contextmanager
     def reporting(self, stage: str, steps: int) -> Iterator[
@@ -44,7 +49,8 @@ class SummaryLog:
 
             def report(step: int, measured: dict[str, float]) -> None:
                 for name, value in measured.items():
-                    self._writer(stage, step).add_scalar(f'{stage}/{name}', value, step)
+                    with self._writing():
+                        self._writer(stage, step).add_scalar(f'{stage}/{name}', value, step)
                     # Single batches are noisy: the bar shows a running mean
                     smooth = name in shown and not name.startswith('validation')
                     shown[name] = 0.98 * shown[name] + 0.02 * value if smooth else value
@@ -59,12 +65,30 @@ class SummaryLog:
             self._writers[stage] = SummaryWriter(self._folder / stage, purge_step=step)
         return self._writers[stage]
 
+    @contextmanager
+    def _writing(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            raise DataError(f'{self._folder}: not written: expected a folder with room, got: '
+                            f'{error.strerror}; make room, and continue with --resume') from error
+
     def __enter__(self) -> 'SummaryLog':
         """Log until the block ends."""
+        threading.excepthook = self._thread_failed
         return self
+
+    def _thread_failed(self, failed: threading.ExceptHookArgs) -> None:
+        """Leave to `_writing` what a writer's thread fails of: the writer raises it here, too."""
+        if not issubclass(failed.exc_type, OSError):
+            self._hook(failed)
 
     def __exit__(self, kind: type[BaseException] | None, value: BaseException | None,
                  trace: TracebackType | None) -> None:
         """Close the log."""
-        for writer in self._writers.values():
-            writer.close()
+        try:
+            with self._writing() if value is None else suppress(OSError):
+                for writer in self._writers.values():
+                    writer.close()
+        finally:
+            threading.excepthook = self._hook
