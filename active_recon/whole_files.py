@@ -25,8 +25,8 @@ def whole_file(path: Path) -> Iterator[Path]:
     except BaseException as error:
         with suppress(OSError):
             unfinished.unlink(missing_ok=True)
-        if isinstance(error, OSError) and error.filename in (None, str(unfinished)) and (
-                error.filename2 is None):
+        if (isinstance(error, OSError) and error.errno is not None  # else its words would be lost
+                and error.filename in (None, str(unfinished)) and error.filename2 is None):
             error.filename = str(path)
         raise
 

@@ -53,6 +53,11 @@ def test_a_folder_that_is_gone_is_told_with_the_name_of_the_file_that_was_to_be_
         unfinished.write_text('what has no place')
 
 
+def test_a_library_s_own_words_stay(tmp_path):
+    with pytest.raises(OSError, match='^no such mode$'), whole_file(tmp_path / 'picture.png'):
+        raise OSError('no such mode')
+
+
 def test_the_folder_of_a_file_is_made_and_nothing_in_it(tmp_path):
     path = tmp_path / 'new' / 'it.json'
     assert writable(path) == path
