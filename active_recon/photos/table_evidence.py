@@ -78,9 +78,10 @@ def _evidence(one: _Compared, others: Sequence[_Compared], table: Ground, planes
     sinking = np.minimum(rays @ table.normal, _FLAT)
     ahead = np.zeros((len(planes), *sinking.shape), np.float32)
     for other in others:
-        in_table = _likelihood(one, other, table)
-        for height, plane in enumerate(planes):
-            ahead[height] += np.nan_to_num(_likelihood(one, other, plane) - in_table)
+        in_table, *in_planes = (_likelihood(one, _carried(other, one, homography))
+                                for homography in _homographies(one, other, [table, *planes]))
+        for height, found in enumerate(in_planes):
+            ahead[height] += np.nan_to_num(found - in_table)
     ahead = _WEIGHT * np.stack([cv2.blur(each, (_WINDOW, _WINDOW)) for each in ahead])
     inside = np.stack([_is_inside(position - (plane.height(position) / sinking)[..., None] * rays)
                        for plane in planes])
@@ -93,45 +94,44 @@ def _is_inside(places: NDArray[np.float64]) -> NDArray[np.bool_]:
     return np.asarray((np.abs(places) <= 0.5).all(axis=-1))
 
 
-def _likelihood(one: _Compared, other: _Compared, plane: Ground) -> Levels:
-    """
-    Return the log density of a photo's colours, (H, W), if another shows the same in a plane.
-
-    It is NaN where one of them does not show the place in the plane.
-    """
-    shown = _carried(other, one, plane)
-    apart = one.levels[..., :3] - shown[..., :3]
+def _likelihood(one: _Compared, shown: Levels) -> Levels:
+    """Return the log density of a photo's colours, (H, W), by another's; NaN where one has none."""
+    apart = one.levels - shown
     step = np.maximum(one.levels[..., 3], shown[..., 3])
+    apart[..., 3] = 0
     variance = 2 * _NOISE ** 2 + (_OF_STEP * step) ** 2
     density = -0.5 * (np.einsum('hwc,hwc->hw', apart, apart) / variance
                       + 3 * np.log(2 * np.pi * variance))
     return np.asarray(np.maximum(np.log(1 - _HIDDEN) + density, _NOTHING), np.float32)
 
 
-def _carried(other: _Compared, one: _Compared, plane: Ground) -> Levels:
-    """Return what another photo shows in a plane where a photo's pixels do; NaN for nothing."""
+def _carried(other: _Compared, one: _Compared, homography: NDArray[np.float64]) -> Levels:
+    """Return what another photo shows where a photo's pixels do, (H, W, 4); NaN for nothing."""
     height, width = one.levels.shape[:2]
-    found = _homography(one.camera, other.camera, plane)
     shown = cv2.warpPerspective(
-        other.levels, found, (width, height), flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
+        other.levels, homography, (width, height), flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
         borderMode=cv2.BORDER_CONSTANT, borderValue=(0, 0, 0, np.nan))
-    down, across = np.ogrid[:height, :width]
-    shown[found[2, 0] * across + found[2, 1] * down + found[2, 2] <= 0] = np.nan  # behind it
+    across, down, least = homography[2]
+    if least + min(0, across) * width + min(0, down) * height <= 0:  # some are behind the other
+        rows, columns = np.ogrid[:height, :width]
+        shown[across * columns + down * rows + least <= 0] = np.nan
     return np.asarray(shown, np.float32)
 
 
-def _homography(one: Camera, other: Camera, plane: Ground) -> NDArray[np.float64]:
+def _homographies(one: _Compared, other: _Compared, planes: Sequence[Ground]
+                  ) -> list[NDArray[np.float64]]:
     """
-    Return the homography, (3, 3), from indices of a camera's pixels to those of another's.
+    Return the homographies, (3, 3), from indices of a photo's pixels to another's by each plane.
 
-    By a plane: Hartley and Zisserman, Multiple View Geometry, eq. 13.2.
+    Hartley and Zisserman, Multiple View Geometry, eq. 13.2. The planes have one normal.
     """
-    other_from_one = np.linalg.inv(other.pose) @ one.pose
-    normal = one.pose[:3, :3].T @ plane.normal
-    away = -float(plane.height(one.position))
-    carried = other_from_one[:3, :3] + np.outer(other_from_one[:3, 3], normal) / away
-    return np.asarray(_by_index(other.intrinsics) @ carried
-                      @ np.linalg.inv(_by_index(one.intrinsics)))
+    other_from_one = np.linalg.inv(other.camera.pose) @ one.camera.pose
+    ray, pixel = np.linalg.inv(_by_index(one.camera.intrinsics)), _by_index(
+        other.camera.intrinsics)
+    turned = pixel @ other_from_one[:3, :3] @ ray
+    moved = np.outer(pixel @ other_from_one[:3, 3],
+                     planes[0].normal @ one.camera.pose[:3, :3] @ ray)
+    return [turned - moved / float(plane.height(one.camera.position)) for plane in planes]
 
 
 def _by_index(lens: Intrinsics) -> NDArray[np.float64]:
