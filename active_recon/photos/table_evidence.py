@@ -95,7 +95,7 @@ def _is_inside(places: NDArray[np.float64]) -> NDArray[np.bool_]:
 
 
 def _likelihood(one: _Compared, shown: Levels) -> Levels:
-    """Return the log density of a photo's colours, (H, W), by another's; NaN where one has none."""
+    """Return the log density of a photo's colours, (H, W), by another's; NaN where not shown."""
     apart = one.levels - shown
     step = np.maximum(one.levels[..., 3], shown[..., 3])
     apart[..., 3] = 0
