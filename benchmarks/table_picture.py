@@ -13,8 +13,7 @@ from pathlib import Path
 
 from active_recon.photos.cube import Cube, MARGIN
 from active_recon.photos.ground import Ground
-from active_recon.photos.seen_photo import SeenPhoto
-from active_recon.photos.segmented_views import agreed_shares
+from active_recon.photos.segmented_views import agreed_shares, seen_photo
 from active_recon.photos.table_evidence import above_table
 from active_recon.segmentation import shipped_segmentation
 from active_recon.volumes.meshes import load_mesh
@@ -45,9 +44,7 @@ def main() -> None:
     segmentation = shipped_segmentation()
     framed = [segmentation.framed(image, cube.camera(camera, 1.0))
               for image, camera in zip(images, cameras, strict=True)]
-    colors = [each.image[..., :3].astype(np.float32) for each in framed]
-    told = above_table([SeenPhoto(each.camera, color, color, np.full(color.shape[:2], True), color)
-                        for each, color in zip(framed, colors, strict=True)], table)
+    told = above_table([seen_photo(each) for each in framed], table)
     agreed = agreed_shares(framed, table)
     figure = Figure(figsize=(8, 4.2), layout='constrained')
     places = figure.subplots(len(_SHOWN), len(_TITLES))

@@ -78,10 +78,8 @@ def frame_count(path: Path) -> int:
     """Return how many images a video file has: as it says, or counted where it does not."""
     capture = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
     try:
-        count = max(0, int(capture.get(cv2.CAP_PROP_FRAME_COUNT)))
-        while not count and capture.grab():
-            return 1 + sum(1 for _ in iter(capture.grab, False))
-        return count
+        told = int(capture.get(cv2.CAP_PROP_FRAME_COUNT))
+        return told if told > 0 else sum(1 for _ in iter(capture.grab, False))
     finally:
         capture.release()
 

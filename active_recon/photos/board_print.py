@@ -60,14 +60,14 @@ def seen_board(image: NDArray[np.uint8], camera: Camera, board: Board, side: int
         none = np.zeros((rows, columns), np.float32)
         return SeenBoard(camera, small, small, known, small, none)
     ink, paper = _light(small, printed, known)
-    edges = known & (_steps(printed) > _TOLERATED[0])
+    edges = known & (steps(printed) > _TOLERATED[0])
     printed = _as_sharp(printed, small, ink, paper, edges)
     expected = ink + printed[..., None] * (paper - ink)
-    flat = known & (_steps(printed) < 1 - _SQUARES[1])
+    flat = known & (steps(printed) < 1 - _SQUARES[1])
     noise = [max(_LEAST_NOISE, 1.48 * float(np.median(values))) if len(values) else _LEAST_NOISE
              for values in np.abs(small - expected)[flat].T]
     apart = _apart(small, ink, expected)
-    step = np.stack([_steps(channel) for channel in np.moveaxis(expected, -1, 0)], axis=-1)
+    step = steps(expected)
     aside = np.median((np.abs(apart) / np.maximum(step, 1)).max(-1)[edges]) if edges.any() else 0
     variance = (np.array(noise) ** 2 + (np.clip(1.5 * aside, *_ASIDE) * step) ** 2
                 + (_UNEVEN * expected) ** 2)
@@ -126,7 +126,8 @@ def _light(image: NDArray[np.float32], printed: NDArray[np.float32], known: NDAr
     return inks, papers
 
 
-def _steps(values: NDArray[np.float32]) -> NDArray[np.float32]:
+def steps(values: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return how far values, (H, W) or (H, W, C), next to each pixel are apart, of that shape."""
     return np.asarray(cv2.dilate(values, _NEXT) - cv2.erode(values, _NEXT), np.float32)
 
 

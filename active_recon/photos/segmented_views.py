@@ -75,6 +75,14 @@ def agreed_shares(framed: Sequence[FramedShares], table: Ground | None = None
     return _agreed(framed, table)[0] if framed else []
 
 
+def seen_photo(framed: FramedShares) -> SeenPhoto:
+    """Return a framed image without its shares; what the camera saw of it is `known`."""
+    image = framed.image[..., :3].astype(np.float32)
+    seen = (np.full(image.shape[:2], True) if framed.image.shape[2] == 3
+            else framed.image[..., 3] > 127)
+    return SeenPhoto(framed.camera, image, image, seen, np.zeros_like(image))
+
+
 def _within(ground: Ground | None, cube: Cube) -> Ground | None:
     return None if ground is None else ground.within(cube)
 
@@ -82,12 +90,7 @@ def _within(ground: Ground | None, cube: Cube) -> Ground | None:
 def _agreed(framed: Sequence[FramedShares], table: Ground | None
             ) -> tuple[list[NDArray[np.float32]], NDArray[np.bool_]]:
     """Return the shares and the cells, (C, C, C), that framed images agree on."""
-    photos = []
-    for each in framed:
-        image = each.image[..., :3].astype(np.float32)
-        seen = (np.full(image.shape[:2], True) if each.image.shape[2] == 3
-                else each.image[..., 3] > 127)
-        photos.append(SeenPhoto(each.camera, image, image, seen, np.zeros_like(image)))
+    photos = [seen_photo(each) for each in framed]
     above = evidence = None
     if table is not None:
         above = table.above(_UNIT_CUBE, CELLS)

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from active_recon.geometry.cameras import Camera, Intrinsics
+from active_recon.photos.board_print import steps, UNIFORM
 from active_recon.photos.ground import Ground
 from active_recon.photos.seen_photo import SeenPhoto
 from active_recon.photos.views import even_choice
@@ -27,13 +28,11 @@ _BLUR = 0.8  # pixels
 _NOISE = 8.0  # grey levels
 _OF_STEP = 0.5  # of the step of colour beside a pixel, its noise where places are a bit off
 _HIDDEN = 0.3  # how often a photo does not show the place, but something before it
-_UNIFORM = -3 * float(np.log(256))  # log density of a colour of which nothing is known
-_NOTHING = np.float32(np.log(_HIDDEN) + _UNIFORM)
+_NOTHING = np.float32(np.log(_HIDDEN) + UNIFORM)
 _WEIGHT = 0.8  # of a photo: their mistakes are alike
 _WINDOW = 3  # pixels that show the same place, as a rule
 _FLAT = -1e-3  # rays that sink less do not meet the table where any photo shows it
 _CLEAR = 0.01  # of a camera above a plane, in sides of the cube
-_NEXT = np.ones((3, 3), np.uint8)
 Levels = NDArray[np.float32]
 
 
@@ -61,8 +60,8 @@ def above_table(photos: Sequence[SeenPhoto], table: Ground) -> list[NDArray[np.f
 
 def _compared(photo: SeenPhoto) -> _Compared:
     """Return a photo with the greatest step of a channel beside each pixel; NaN where unknown."""
-    soft = cv2.GaussianBlur(photo.image, (0, 0), _BLUR)
-    step = (cv2.dilate(soft, _NEXT) - cv2.erode(soft, _NEXT)).max(axis=-1)
+    soft = np.asarray(cv2.GaussianBlur(photo.image, (0, 0), _BLUR), np.float32)
+    step = steps(soft).max(axis=-1)
     step[~photo.known] = np.nan
     return _Compared(photo.camera, np.dstack([soft, step]).astype(np.float32))
 
