@@ -1,12 +1,14 @@
 """Image published to goal received: reconstructor and planner beside a camera, over DDS."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 import json
 import os
 from pathlib import Path
 from tempfile import TemporaryDirectory
 import time
+from types import MappingProxyType
+from typing import Any
 
 from active_recon.geometry.cameras import Camera
 from active_recon.launching.processes import NodeProcesses, private_environment
@@ -27,8 +29,8 @@ LOOP = {
 def goal_figures() -> list[Figure]:
     """Send raw images of 640 x 480 pixels; time the occupancy and the goal of each."""
     figures = []
-    for threads, where in ((1, ''), (2, ', threads: 2')):
-        with loop_processes(threads=threads) as nodes, _camera() as send:
+    for more, where in (({}, ''), ({'threads': 1}, ', threads: 1')):
+        with loop_processes(more) as nodes, _camera() as send:
             pids = [nodes.pid(node) for node in LOOP]
             figures += [*_measured(send, pids, where), memory_figure(pids, where)]
     return figures
@@ -71,9 +73,14 @@ def cpu_seconds(pids: list[int]) -> float:
 
 
 @contextmanager
-def loop_processes(single: bool = False, threads: int = 1) -> Iterator[NodeProcesses]:
-    """Start reconstructor and planner, each in a process or in one, in a domain of their own."""
-    loop = {node: {**parameters, 'threads': threads} for node, parameters in LOOP.items()}
+def loop_processes(more: Mapping[str, Any] = MappingProxyType({}),
+                   single: bool = False) -> Iterator[NodeProcesses]:
+    """
+    Start reconstructor and planner, each in a process or in one, in a domain of their own.
+
+    Both have the parameters `more`, too.
+    """
+    loop = {node: {**parameters, **more} for node, parameters in LOOP.items()}
     environment = private_environment()
     os.environ.update(environment)
     with TemporaryDirectory() as logs, NodeProcesses(Path(logs), environment) as nodes:

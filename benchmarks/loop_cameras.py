@@ -13,8 +13,9 @@ from benchmarks.core import OBJECTS
 import numpy as np
 
 _RATE = 36.0  # images a second
-_VIEWS = 75  # of a run that shows views; all runs together are one episode, of at most 1000
-_EPISODES, _GOALS = 2, 20  # of a run that goes to goals, and of each of its episodes
+_VIEWS = 75  # of a run that shows views
+_EPISODES = 2  # of a run that goes to goals
+_GOALS = 20  # of an episode: after all views a policy has nowhere to go
 _STEP = math.radians(30)  # from image to image, while the camera moves
 _BUDGET_S = 120.0
 _AGAIN_S = 2.0
@@ -26,7 +27,7 @@ GoalTimes = AbstractContextManager[Callable[[], float]]
 @contextmanager
 def showing_camera() -> Iterator[Callable[[], float]]:
     """Join the loop as a camera that shows it one view after the other, wherever the goal is."""
-    with _joined() as (hear, publish, spin, _):
+    with _joined() as (hear, publish, spin, ask):
         goals: dict[int, float] = {}
         hear('next_view', lambda stamp, _: goals.setdefault(stamp, time.perf_counter()))
 
@@ -43,8 +44,10 @@ def showing_camera() -> Iterator[Callable[[], float]]:
 
         def goal_ms() -> float:
             spent = []
-            due = time.perf_counter()
             for turn in range(_VIEWS):
+                if turn % _GOALS == 0:
+                    ask('start_episode', _BUDGET_S, lambda: None)
+                    due = time.perf_counter()
                 spent.append(show(AZIMUTHS[turn % len(AZIMUTHS)]))
                 due = max(due + 1 / _RATE, time.perf_counter())
                 while time.perf_counter() < due:
@@ -59,8 +62,7 @@ def moving_camera() -> Iterator[Callable[[], float]]:
     """
     Join the loop as a camera in operation: it streams, and goes from goal to goal.
 
-    With a step from image to image this makes four to five views a second. An episode ends while
-    there are still views that were not taken: after them a policy has nowhere to go.
+    With a step from image to image this makes four to five views a second.
     """
     with _joined() as (hear, publish, spin, ask):
         goals: dict[int, tuple[float, float]] = {}  # by stamp: when first heard, and where

@@ -26,7 +26,7 @@ class NetworkParameters:
     weights: str = parameter(
         '', 'weights file, or a model whose weights ship; empty for the default model',
         path=True)
-    threads: int = parameter(1, 'number of CPU threads of the network', low=1, high=256)
+    threads: int = parameter(2, 'number of CPU threads of the network', low=1, high=256)
     runtime: str = parameter(
         AUTO, 'library that runs the network; auto is openvino where its weights are exported, '
         'else torch', choices=RUNTIME_CHOICES)

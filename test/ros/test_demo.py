@@ -193,7 +193,7 @@ def test_the_bag_says_what_made_it(finished):
     summary = open_bag(finished[0]).summary()
     assert summary.provenance == {
         'version': __version__, 'object': 'chair.glb', 'policy': 'attention', 'seed': '0',
-        'needs_front': 'false', **load_runtime(threads=1).provenance}
+        'needs_front': 'false', **load_runtime(threads=2).provenance}
     assert {name: parameters['use_sim_time']
             for name, parameters in summary.parameters.items()} == dict.fromkeys(
         ('recorder', 'turntable_camera', 'reconstructor', 'view_planner'), False)
