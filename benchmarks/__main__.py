@@ -17,6 +17,7 @@ from benchmarks.figures import Figure, reference_ms
 from benchmarks.goal import goal_figures, single_process_figures
 from benchmarks.idle import idle_figure
 from benchmarks.loop import demo_figure, reconstructor_figures
+from benchmarks.mapped_memory import memory_figures
 from benchmarks.published_networks import published_figures
 from benchmarks.record import HEAD, keep, part_record, rows
 from benchmarks.runtimes import runtime_figures, segmenter_figures, small_figures
@@ -24,6 +25,7 @@ from benchmarks.stream import stream_figures
 from benchmarks.viewer import watching_figures
 
 PARTS: Mapping[str, Callable[[], list[Figure]]] = {
+    'memory': lambda: list(memory_figures()),
     'view': episode_figures,
     'runtimes': runtime_figures,
     'small': small_figures,

@@ -10,6 +10,8 @@ import time
 
 import numpy as np
 
+_UNITS = ('amx_bf16', 'avx512_bf16', 'avx512_vnni', 'avx512f', 'avx2')
+
 
 @dataclass(frozen=True)
 class Figure:
@@ -67,10 +69,12 @@ def interleaved(tasks: Mapping[str, Callable[[], object]],
 
 
 def machine() -> str:
-    """Return the processor of this machine and the number of its threads, in words."""
+    """Return the processor of this machine, its widest units and its threads, in words."""
     file = Path('/proc/cpuinfo')
-    named = re.search(r'^model name\s*: (.*)$', file.read_text() if file.is_file() else '', re.M)
-    return f'{named[1] if named else platform.machine()}, {os.cpu_count()} threads'
+    told = file.read_text() if file.is_file() else ''
+    named = re.search(r'^model name\s*: (.*)$', told, re.M)
+    units = next((f' with {each}' for each in _UNITS if re.search(rf'\b{each}\b', told)), '')
+    return f'{named[1] if named else platform.machine()}{units}, {os.cpu_count()} threads'
 
 
 def reference_ms() -> float:

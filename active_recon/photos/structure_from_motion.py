@@ -6,9 +6,10 @@ pycolmap, on the CPU. It gets upright, smaller copies of the photos.
 """
 
 from collections.abc import Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from importlib import import_module
-from itertools import count
+from itertools import combinations, count
 import math
 from pathlib import Path
 import signal
@@ -20,6 +21,7 @@ from active_recon.errors import ConfigError, DataError
 from active_recon.photos.camera_file import CameraFile, Lens, PosedPhoto
 from active_recon.photos.colmap import colmap_lens
 from active_recon.photos.files import PhotoFile, read_photo
+from active_recon.photos.likely_pairs import likely_pairs
 from active_recon.reporting import Advance, by_step, Reporting, silent
 import cv2
 import numpy as np
@@ -32,6 +34,7 @@ _NAME = 'structure from motion'
 _LONGEST = 1600  # pixels of a copy: more takes longer and hardly finds more
 _FEATURES = 2048  # of a photo; 4096 take twice the time for half the error
 _AT_ONCE = 8  # copies that all cores work on together
+_PAIRS_AT_ONCE = 32  # between such blocks COLMAP hears that it is to stop
 _INLIERS = {'init_min_num_inliers': 40, 'abs_pose_min_num_inliers': 15,
             'abs_pose_min_inlier_ratio': 0.15}
 """Fewer than COLMAP's own: it is made for photos of large places, with more to see in them."""
@@ -45,9 +48,10 @@ def sfm_photos(photos: Sequence[PhotoFile], reporting: Reporting = silent
     Return the cameras of the photos that fit together, and why others are left out.
 
     The world's origin, axes and scale are arbitrary. Photos of one size and of one focal length
-    by EXIF share a lens, which is estimated. Where some photos do not fit, all are tried again
-    with features that are less sensitive to the side that they are seen from. Raises ConfigError
-    where pycolmap is not installed, DataError where fewer than FEWEST photos fit, or than half.
+    by EXIF share a lens, which is estimated. Where some photos do not fit, all pairs are tried
+    again with features that are less sensitive to the side that they are seen from. Raises
+    ConfigError where pycolmap is not installed, DataError where fewer than FEWEST photos fit, or
+    than half.
     """
     colmap = _library()
     found: Mapping[str, tuple[NDArray[np.float64], Lens]] = {}
@@ -146,9 +150,12 @@ def _cameras(colmap: Any, copies: Sequence[_Copy], folder: Path, own: Path, pati
             reader.existing_camera_id = number  # COLMAP counts them so
             done += len(names)
             reached(done, 'features')
-    pairing = colmap.ExhaustivePairingOptions()
-    pairing.block_size = _AT_ONCE  # between blocks it hears that it is to stop
-    colmap.match_exhaustive(database, matching, pairing, device=colmap.Device.cpu)
+    pairing = colmap.ImportedPairingOptions()
+    pairing.match_list_path, pairing.block_size = own / 'pairs.txt', _PAIRS_AT_ONCE
+    pairs = combinations(sorted(copy.name for copy in copies), 2) if patient else _likely_pairs(
+        colmap, database)
+    pairing.match_list_path.write_text(''.join(f'{one} {other}\n' for one, other in pairs))
+    colmap.match_image_pairs(database, matching, pairing, device=colmap.Device.cpu)
     mapping = colmap.IncrementalPipelineOptions()
     for name, value in {**_INLIERS, **_LENSES}.items():
         setattr(mapping.mapper, name, value)
@@ -160,6 +167,17 @@ def _cameras(colmap: Any, copies: Sequence[_Copy], folder: Path, own: Path, pati
     model = max(models.values(), key=lambda each: int(each.num_reg_images()), default=None)
     return {} if model is None else {
         image.name: _camera(image) for image in model.images.values() if image.has_pose}
+
+
+def _likely_pairs(colmap: Any, database: Path) -> list[tuple[str, str]]:
+    """Return the names of the copies that are compared; see `likely_pairs`."""
+    with closing(colmap.Database.open(database)) as features:
+        images = features.read_all_images()
+        shapes = [features.read_keypoints(image.image_id)[:, 2:] for image in images]  # 2 x 2 each
+        pairs = likely_pairs(
+            [features.read_descriptors(image.image_id).data for image in images],
+            [np.abs(each[:, 0] * each[:, 3] - each[:, 1] * each[:, 2]) for each in shapes])
+    return [(images[one].name, images[other].name) for one, other in pairs]
 
 
 def _camera(image: Any) -> tuple[NDArray[np.float64], Lens]:

@@ -1,0 +1,52 @@
+"""Which photos are worth comparing in full: those that a quick look finds most alike."""
+
+from collections.abc import Sequence
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+_LARGEST = 512  # features of a photo that are looked at
+_PARTNERS = 10  # of a photo, at least
+_MAX_RATIO = 0.8  # of the angles to the nearest and to the second nearest, as of COLMAP
+
+
+def likely_pairs(descriptors: Sequence[NDArray[np.uint8]],
+                 scales: Sequence[NDArray[np.float32]]) -> list[tuple[int, int]]:
+    """
+    Return the pairs of photos (i, j), i < j, that probably show the same things, in order.
+
+    Takes the descriptors, (N, 128), and the scales, (N,), of each photo's features. The largest
+    are matched, by Lowe's ratio and in both directions (Wu, Towards Linear-time Incremental
+    Structure from Motion, 3DV 2013, 2.1), and each photo is paired with the 10 that have most
+    matches with it: so all are where there are no more. Photos without features are in no pair.
+    """
+    looks = [_directions(each, sizes) for each, sizes in zip(descriptors, scales, strict=True)]
+    shared = np.zeros((len(looks), len(looks)), int)
+    for one, other in combinations(range(len(looks)), 2):
+        if len(looks[one]) and len(looks[other]):
+            shared[one, other] = shared[other, one] = 1 + _matches(looks[one], looks[other])
+    chosen = set()
+    for one, counts in enumerate(shared):
+        best = np.argsort(-counts, kind='stable')[:_PARTNERS]
+        chosen |= {(min(one, other), max(one, other))
+                   for other in map(int, best) if counts[other]}
+    return sorted(chosen)
+
+
+def _directions(descriptors: NDArray[np.uint8],
+                scales: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return the descriptors of the largest features as unit vectors, (M, 128)."""
+    largest = descriptors[np.argsort(-scales, kind='stable')[:_LARGEST]].astype(np.float32)
+    return largest / np.maximum(np.linalg.norm(largest, axis=1, keepdims=True), 1)
+
+
+def _matches(one: NDArray[np.float32], other: NDArray[np.float32]) -> int:
+    """Return the number of mutual nearest neighbours that are much nearer than the next."""
+    alike = one @ other.T  # (M, M')
+    nearest = alike.argmax(axis=1)
+    mutual = alike.argmax(axis=0)[nearest] == np.arange(len(one))
+    cosine = alike[np.arange(len(one)), nearest]
+    alike[np.arange(len(one)), nearest] = -1
+    angle, second = (np.arccos(each.clip(-1, 1)) for each in (cosine, alike.max(axis=1)))
+    return int((mutual & (angle < _MAX_RATIO * second)).sum())
