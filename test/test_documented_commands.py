@@ -17,10 +17,12 @@ import typer
 ROOT = Path(__file__).parents[1]
 PAGES = [*ROOT.glob('*.md'), *ROOT.glob('doc/*.md'), *ROOT.glob('bags/**/README.md'),
          ROOT / 'security/README.md']
-_BLOCK = re.compile(r'^ *```[^\n]*\n(.*?)^ *```', re.MULTILINE | re.DOTALL)
-TEXT = '\n'.join(page.read_text() for page in PAGES)
-LINES = re.sub(r'\\\n', '', '\n'.join(_BLOCK.findall(TEXT))).splitlines()
-SPANS = re.findall(r'`([^`]+)`', _BLOCK.sub('', TEXT))
+_FENCED = re.compile(r'^ *```[^\n]*\n(.*?)^ *```', re.MULTILINE | re.DOTALL)
+_TEXT = '\n'.join(page.read_text() for page in PAGES).replace('\\\n', '')
+_PROSE = _FENCED.sub('', _TEXT)
+LINES = [*'\n'.join(_FENCED.findall(_TEXT)).splitlines(),
+         *re.findall('^    .+', _PROSE, re.MULTILINE)]
+SPANS = re.findall(r'`([^`]+)`', _PROSE)
 
 
 def words_after(program, texts):
@@ -83,6 +85,13 @@ def test_a_page_makes_targets_that_exist(parser):
         assert {word for word in shlex.split(asked) if '=' not in word} <= targets
         if demo := re.match('demo ARGS=(.+)', ' '.join(words)):
             accepted(parser, ['demo', *shlex.split(demo[1])])
+
+
+def test_a_page_runs_tests_that_exist():
+    for path, *named in words_after('pytest', LINES):
+        assert (ROOT / path).exists()
+        for flag, word in zip(named, named[1:], strict=False):
+            assert flag == '-k' and re.search(rf'def test_\w*{word}', (ROOT / path).read_text())
 
 
 def test_a_page_sets_parameters_that_exist():
