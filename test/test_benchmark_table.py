@@ -1,5 +1,6 @@
 """The table of doc/benchmarks.md is that of what was measured."""
 
+from argparse import ArgumentParser
 from importlib import import_module
 import json
 from pathlib import Path
@@ -13,6 +14,7 @@ from benchmarks.figures import Figure
 from benchmarks.record import DOCUMENT, keep, part_record, RESULTS, rows, with_table
 from benchmarks.stream import counting_lost
 import pytest
+from shown_commands import LINES, SPANS, words_after
 from trimesh.creation import box
 
 ROOT = RESULTS.parents[2]
@@ -58,6 +60,31 @@ def test_every_benchmark_explains_itself(name, monkeypatch, capsys):
         benchmark.main()
     assert not ended.value.code
     assert 'usage: ' in capsys.readouterr().out
+
+
+def test_a_page_names_parts_that_exist():
+    for words in words_after('python -m benchmarks', [*LINES, *SPANS]):
+        assert PARTS.keys() >= set(words)
+
+
+@pytest.mark.parametrize('name', BENCHMARKS)
+def test_a_benchmark_is_shown_with_options_that_it_accepts(name, monkeypatch):
+    class Accepted(Exception):  # noqa: N818
+        """All options were read, and nothing is measured."""
+
+    def parse(parser):
+        read(parser)
+        raise Accepted
+
+    read = ArgumentParser.parse_args
+    monkeypatch.setattr(ArgumentParser, 'parse_args', parse)
+    benchmark = import_module(f'benchmarks.{name}')
+    own = (benchmark.__doc__ or '').replace('\\\n', '').splitlines()
+    for words in words_after(rf'(?:PYTHONPATH=test )?python -m benchmarks\.{name}',
+                             [*LINES, *SPANS, *own]):
+        monkeypatch.setattr(sys, 'argv', [name, *words])
+        with pytest.raises(Accepted):
+            benchmark.main()
 
 
 @pytest.mark.parametrize('name', ['lifting', 'views'])

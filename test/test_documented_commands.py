@@ -1,7 +1,6 @@
 """Every command line that is shown to be copied is accepted by what it calls."""
 
 from dataclasses import fields
-from pathlib import Path
 import re
 import shlex
 import shutil
@@ -10,28 +9,9 @@ import subprocess
 from active_recon.cli.main import app
 from active_recon.parameters.node_parameters import NODE_PARAMETERS
 from benchmarks import lifting, views
-from benchmarks.__main__ import PARTS
 import pytest
+from shown_commands import LINES, ROOT, SPANS, words_after
 import typer
-
-ROOT = Path(__file__).parents[1]
-PAGES = [*ROOT.glob('*.md'), *ROOT.glob('doc/*.md'), *ROOT.glob('bags/**/README.md'),
-         ROOT / 'security/README.md']
-_FENCED = re.compile(r'^ *```[^\n]*\n(.*?)^ *```', re.MULTILINE | re.DOTALL)
-_TEXT = '\n'.join(page.read_text() for page in PAGES).replace('\\\n', '')
-_PROSE = _FENCED.sub('', _TEXT)
-LINES = [*'\n'.join(_FENCED.findall(_TEXT)).splitlines(),
-         *re.findall('^    .+', _PROSE, re.MULTILINE)]
-SPANS = re.findall(r'`([^`]+)`', _PROSE)
-
-
-def words_after(program, texts):
-    """Return the words that follow a program's name in each of the texts that begin with it."""
-    start = re.compile(rf'\s*(?:\.venv/bin/)?{program}\s+')
-    found = [shlex.split(text[called.end():], comments=True) for text in texts
-             if (called := start.match(text))]
-    assert found
-    return [[word for word in words if word != '...'] for words in found]  # more of the same
 
 
 def names(node):
@@ -58,7 +38,9 @@ def accepted(parser, words):
 
 
 def test_a_page_shows_commands_that_are_accepted(parser):
-    for words in words_after('active-recon', LINES):
+    shown = words_after('active-recon', LINES)
+    assert len(shown) > 50
+    for words in shown:
         accepted(parser, words)
 
 
@@ -101,11 +83,6 @@ def test_a_page_sets_parameters_that_exist():
         assert given <= names(node)
     for node, name, _ in words_after('ros2 param set', LINES):
         assert name in names(node)
-
-
-def test_a_page_names_parts_of_the_benchmarks_that_exist():
-    for words in words_after('python -m benchmarks', [*LINES, *SPANS]):
-        assert PARTS.keys() >= set(words)
 
 
 @pytest.mark.parametrize(('command', 'studies'), [
