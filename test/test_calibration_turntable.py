@@ -16,6 +16,7 @@ from active_recon.geometry.turntable_pose import FixedCamera
 import cv2
 import numpy as np
 import pytest
+from recorded_messages import small_disk
 from rendered_boards import BOARD, fixed_camera, LENS, on_table, render, WIDE
 from scipy.spatial.transform import Rotation
 
@@ -252,6 +253,14 @@ def test_a_lens_is_written_as_ros_counts_pixels_from_the_first_one_s_centre(tmp_
     write_lens(LENS, tmp_path / 'lens.yaml')
     text = (tmp_path / 'lens.yaml').read_text()
     assert 'data: [730.0, 0.0, 319.5, 0.0, 730.0, 239.5, 0.0, 0.0, 1.0]' in text
+
+
+def test_a_lens_that_finds_no_room_leaves_the_one_that_stood_there(tmp_path):
+    path = tmp_path / 'camera_info.yaml'
+    write_lens(LENS, path)
+    with small_disk(50), pytest.raises(OSError):
+        write_lens(WIDE, path)
+    assert read_lens(path) == LENS and list(tmp_path.iterdir()) == [path]
 
 
 def test_a_fisheye_that_is_known_serves_too():

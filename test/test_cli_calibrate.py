@@ -1,6 +1,7 @@
 """`active-recon calibrate`: images in, the parameters of the nodes out."""
 
 import math
+from shutil import copytree
 
 from active_recon.calibration.lens import project, write_lens
 from active_recon.cli.main import app
@@ -10,6 +11,7 @@ from active_recon.parameters.params_file import read_params_file
 import cv2
 import numpy as np
 import pytest
+from recorded_messages import small_disk
 from rendered_boards import BOARD, fixed_camera, LENS, on_table, render
 from typer.testing import CliRunner
 import yaml
@@ -98,6 +100,16 @@ def test_a_calibration_s_own_camera_info_can_be_given_again(written, folder):
     assert result.exit_code == 0, result.output
     assert (folder / 'again' / 'calibration.yaml').read_text() == (
         folder / 'out' / 'calibration.yaml').read_text()
+
+
+def test_a_calibration_that_finds_no_room_leaves_the_one_that_stood_there(written, folder, tmp_path):
+    copytree(folder / 'out', tmp_path / 'out')
+    with small_disk(50):
+        said = refusal(folder / 'images', *OPTIONS, '--step-deg', STEP_DEG, '--camera-info',
+                       folder / 'lens.yaml', '--out', tmp_path / 'out')
+    assert 'out: calibration not written: ' in said
+    assert {path.name: path.read_bytes() for path in (tmp_path / 'out').iterdir()} == {
+        path.name: path.read_bytes() for path in (folder / 'out').iterdir()}
 
 
 def test_angles_by_name_give_what_the_step_gives(written, folder):

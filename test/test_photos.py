@@ -1,6 +1,7 @@
 """An object is reconstructed from photos as they are, wherever it stands in the cameras' world."""
 
 from dataclasses import replace
+import errno
 import json
 import os
 from pathlib import Path
@@ -480,6 +481,22 @@ def test_a_folder_that_cannot_be_made_is_told(shape, tmp_path):
     (tmp_path / 'out').write_text('a file')
     with pytest.raises(DataError, match='out: not written: expected a folder with room'):
         save_shape(shape, tmp_path / 'out')
+
+
+def test_a_description_that_finds_no_room_leaves_the_one_that_stood_there(
+        shape, tmp_path, monkeypatch):
+    save_shape(shape, tmp_path)
+    before = (tmp_path / 'shape.json').read_text()
+    whole = Path.write_text
+
+    def full(path, text):
+        whole(path, text[:5])
+        raise OSError(errno.ENOSPC, 'no space left')
+
+    monkeypatch.setattr(Path, 'write_text', full)
+    with pytest.raises(DataError, match='not written: expected a folder with room'):
+        save_shape(shape, tmp_path)
+    assert (tmp_path / 'shape.json').read_text() == before
 
 
 def test_the_command_says_what_a_robot_description_lacks(shape, tmp_path, monkeypatch):

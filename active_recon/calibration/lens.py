@@ -10,6 +10,7 @@ from active_recon.calibration.board import Detection
 from active_recon.errors import DataError, ViewError
 from active_recon.geometry.cameras import Camera, Intrinsics
 from active_recon.geometry.lenses import Distortion, MODELS
+from active_recon.whole_files import whole_file
 from active_recon.yaml_text import yaml_value
 import cv2
 import numpy as np
@@ -46,14 +47,16 @@ def write_lens(lens: Intrinsics, path: Path) -> None:
     """Write the lens parameters in the YAML format of ROS's camera_calibration."""
     matrix = _as_ros_counts(lens)
     distortion = lens.distortion or _STRAIGHT
-    path.write_text(yaml.safe_dump({
+    text = yaml.safe_dump({
         'image_width': lens.width, 'image_height': lens.height, 'camera_name': 'camera',
         'camera_matrix': _table(matrix),
         'distortion_model': distortion.model,
         'distortion_coefficients': _table(np.array([distortion.coefficients])),
         'rectification_matrix': _table(np.eye(3)),
         'projection_matrix': _table(np.column_stack([matrix, np.zeros(3)])),
-    }, sort_keys=False, default_flow_style=None))
+    }, sort_keys=False, default_flow_style=None)
+    with whole_file(path) as unfinished:
+        unfinished.write_text(text)
 
 
 def read_lens(path: Path) -> Intrinsics:

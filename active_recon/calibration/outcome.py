@@ -12,6 +12,7 @@ from active_recon.calibration.picture import picture_of
 from active_recon.errors import DataError
 from active_recon.geometry.cameras import Intrinsics
 from active_recon.png_files import write_png
+from active_recon.whole_files import whole_file
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
@@ -55,7 +56,8 @@ class Calibration:
                              lambda name: read_image(by_name[name]))
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            (folder / 'calibration.yaml').write_text(self.as_yaml())
+            with whole_file(folder / 'calibration.yaml') as unfinished:
+                unfinished.write_text(self.as_yaml())
             write_lens(self.lens, folder / 'camera_info.yaml')
             write_png(folder / 'calibration.png', picture)
         except OSError as error:

@@ -14,6 +14,7 @@ from active_recon.photos.shape import Shape
 from active_recon.png_files import write_png
 from active_recon.volumes.binvox import write_binvox
 from active_recon.volumes.voxel_files import write_npz
+from active_recon.whole_files import whole_file
 
 FORMATS = (*MESH_FORMATS, 'urdf')
 """Of the mesh; `urdf` is a robot description, see `write_urdf`."""
@@ -42,7 +43,8 @@ def save_shape(shape: Shape, folder: Path, mesh_format: str = 'ply'
         write_npz(shape.grid, voxels, shape.threshold)
         write_binvox(shape.grid, binvox, shape.threshold)
         write_png(picture, shape_picture(shape)[..., ::-1])
-        description.write_text(json.dumps(described(shape), indent=1) + '\n')
+        with whole_file(description) as unfinished:
+            unfinished.write_text(json.dumps(described(shape), indent=1) + '\n')
     except OSError as error:
         raise DataError(f'{folder}: not written: expected a folder with room, got: '
                         f'{error}') from error
