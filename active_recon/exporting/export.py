@@ -56,7 +56,9 @@ def export(weights: Path, folder: Path | None = None) -> list[Path]:
     something that no graph can have, where onnx is not installed, or where no file can be written.
     """
     _require_onnx()
+    place = folder or weights.parent
     if is_segmenter(weights):
+        writable_folder(place)
         told = GraphMetadata(SEGMENT_PART, weights_hash(weights), {}, {'image_size': IMAGE_SIZE})
         part = segment_part(read_segmenter(weights))
         return _saved({SEGMENT_PART: _written('segmenter', part, told)}, weights, folder)
@@ -73,6 +75,7 @@ def export(weights: Path, folder: Path | None = None) -> list[Path]:
     parts = _parts(bundle.model, network)
     _require_steady(bundle.model, first, dict(parts['decode'].inputs))
     state = _described(bundle.model, first)
+    writable_folder(place)  # tells before the networks are traced
     graphs = {name: _written(bundle.model, part, GraphMetadata(name, digest, state, facts))
               for name, part in parts.items()}
     graphs |= _policy_graph(weights, bundle, digest)
@@ -85,7 +88,6 @@ def export(weights: Path, folder: Path | None = None) -> list[Path]:
 
 def _saved(graphs: Mapping[str, bytes], weights: Path, folder: Path | None) -> list[Path]:
     """Write graphs beside weights, or in another folder; return the files."""
-    writable_folder(folder or weights.parent)
     written = []
     for name, data in graphs.items():
         written.append(graph_path(weights, name, folder))
