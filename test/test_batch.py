@@ -267,6 +267,22 @@ def test_a_fault_of_the_program_refuses_its_bag_alone(archive, tmp_path, monkeyp
     assert [row['refused_kind'] for row in others] == ['data', '', '']
 
 
+def test_a_bag_that_found_too_little_memory_is_tried_again(archive, tmp_path, monkeypatch):
+    rows_of = work.rows_of
+
+    def short_of_memory(task, bag):
+        if bag.name == 'a':
+            raise MemoryError
+        return rows_of(task, bag)
+
+    monkeypatch.setattr(work, 'rows_of', short_of_memory)
+    first, *_ = batch(monkeypatch, 'measure', archive, tmp_path / 'out')
+    assert 'a: MemoryError' in first['refused']
+    monkeypatch.setattr(work, 'rows_of', rows_of)
+    first, *_ = batch(monkeypatch, 'measure', archive, tmp_path / 'out')
+    assert not first['refused']
+
+
 def test_a_file_in_the_place_of_the_folder_is_told_in_one_line(
         archive, tmp_path, monkeypatch, capsys):
     (tmp_path / 'out').write_text('a file')
