@@ -9,7 +9,7 @@ NAME = 'active_recon'
 NODES = ('camera', 'composed', 'reconstructor', 'recorder', 'turntable_camera', 'view_planner',
          'viewer')
 EXECUTABLES = {
-    'active-recon': f'{NAME}.cli.main', **{node: f'{NAME}.nodes.{node}' for node in NODES}}
+    'active-recon': f'{NAME}.cli.start', **{node: f'{NAME}.nodes.{node}' for node in NODES}}
 
 # A sourced ROS has rclpy and the messages; the wheels beside it would be a second ROS.
 ROS_WHEELS = () if 'ROS_DISTRO' in os.environ else (

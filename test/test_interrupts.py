@@ -53,13 +53,41 @@ def test_a_command_hears_what_asks_it_to_stop_in_an_import_once_that_is_done(
     before = {kind: signal.getsignal(kind) for kind in (signal.SIGINT, signal.SIGTERM)}
     try:
         signal.signal(asked, signal.default_int_handler)  # a shell's background ignores Ctrl-C
-        with pytest.raises(KeyboardInterrupt):
+        with pytest.raises(SystemExit, match='^130$'):
             commands.main()
     finally:
         del sys.modules['swallowing']
         for kind, handler in before.items():
             signal.signal(kind, handler)
     assert imported == [True]
+
+
+def test_a_command_that_is_stopped_while_it_is_imported_ends_without_a_word():
+    ended = subprocess.run([sys.executable, '-c', '''
+import os
+import signal
+import sys
+from active_recon.cli.start import main
+
+class Stopping:
+    def find_spec(self, name, *_):
+        if name == 'active_recon.cli.main':
+            os.kill(os.getpid(), signal.SIGINT)
+
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background ignores Ctrl-C
+sys.meta_path.insert(0, Stopping())
+main()
+'''], capture_output=True, text=True, timeout=30, check=False)
+    assert (ended.returncode, ended.stdout, ended.stderr) == (-signal.SIGINT, '', '')
+
+
+def test_a_command_that_is_stopped_before_it_runs_ends_without_a_traceback(monkeypatch):
+    def run():
+        raise KeyboardInterrupt  # as while typer builds all commands
+
+    monkeypatch.setattr(commands, 'app', run)
+    with pytest.raises(SystemExit, match='^130$'):
+        commands.main()
 
 
 @pytest.mark.parametrize('asked', [

@@ -100,6 +100,8 @@ def main() -> None:
     except (ActiveReconError, OSError) as error:
         sys.stderr.write(f'active-recon: {error}\n')
         sys.exit(2)
+    except KeyboardInterrupt:  # before typer, which builds all commands first, would take it
+        sys.exit(130)
     finally:
         # All that was imported ends with the process: looking through it takes 0.2 s
         gc.freeze()
