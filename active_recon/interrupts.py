@@ -9,6 +9,7 @@ from types import FrameType
 
 _IMPORTING = '<frozen importlib._bootstrap>'
 _AGAIN_AFTER = 0.01  # seconds
+_is_interrupted = False
 
 
 def stop_signals() -> tuple[signal.Signals, ...]:
@@ -26,10 +27,27 @@ def interrupt(kind: int, frame: FrameType | None) -> None:
     while frame is not None and frame.f_code.co_filename != _IMPORTING:
         frame = frame.f_back
     if frame is None:
+        global _is_interrupted
+        _is_interrupted = True
         raise KeyboardInterrupt
     again = threading.Timer(_AGAIN_AFTER, os.kill, (os.getpid(), kind))
     again.daemon = True
     again.start()
+
+
+def is_interrupted() -> bool:
+    """
+    Return whether `interrupt` has raised: what fails since then fails for that.
+
+    Some libraries make an error of their own of it, as torch does where weights are read.
+    """
+    return _is_interrupted
+
+
+def forget_interrupt() -> None:
+    """Begin anew, as a command does: `is_interrupted` is false."""
+    global _is_interrupted
+    _is_interrupted = False
 
 
 @contextmanager

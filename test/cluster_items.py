@@ -7,6 +7,7 @@ import sys
 import time
 
 from active_recon.errors import DataError, WorkError
+from active_recon.whole_files import whole_file
 
 
 def halved(number):
@@ -66,6 +67,18 @@ def slowly(folder, number):
     time.sleep(0.1)
     (Path(folder) / f'{number}-{os.getpid()}').touch()
     return os.getpid()
+
+
+def for_ever_but_the_first(folder, number):
+    """Return 0 once 1 is begun; begin to write a file of the others, and never end."""
+    if number == 0:
+        while not list(Path(folder).glob('.1.*')):
+            time.sleep(0.01)
+        return 0
+    with whole_file(Path(folder) / str(number)) as unfinished:
+        unfinished.touch()
+        time.sleep(600)
+    return number
 
 
 def quick_at_first(number):

@@ -9,6 +9,7 @@ from pathlib import Path
 import re
 import shlex
 import shutil
+import signal
 import subprocess
 
 from active_recon.bags.runs.loop_setup import Overrides
@@ -24,6 +25,7 @@ from active_recon.batch.summary import MOST_SHOWN, Summary
 from active_recon.batch.table import read_table, write_table
 from active_recon.batch.task import Task, TruthSource
 from active_recon.errors import ConfigError, DataError
+from active_recon.interrupts import interrupt
 from active_recon.reconstructor import Reconstructor
 from active_recon.report.findings import stopped
 from command_line import command, refusal
@@ -281,6 +283,20 @@ def test_a_bag_that_found_too_little_memory_is_tried_again(archive, tmp_path, mo
     monkeypatch.setattr(work, 'rows_of', rows_of)
     first, *_ = batch(monkeypatch, 'measure', archive, tmp_path / 'out')
     assert not first['refused']
+
+
+def test_a_bag_whose_work_was_interrupted_is_not_kept_as_refused(archive, tmp_path, monkeypatch):
+    def interrupted(task, bag):
+        try:
+            interrupt(signal.SIGTERM, None)
+        except KeyboardInterrupt:
+            raise ValueError('what a library makes of it') from None
+
+    monkeypatch.setattr('active_recon.interrupts._is_interrupted', False)  # and so again after
+    monkeypatch.setattr(work, 'rows_of', interrupted)
+    assert command(monkeypatch, 'batch', 'measure', archive, '--out', tmp_path / 'out',
+                   '--workers', 1) == 130
+    assert not list((tmp_path / 'out').rglob('*.json'))
 
 
 def test_a_file_in_the_place_of_the_folder_is_told_in_one_line(

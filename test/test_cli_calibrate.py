@@ -102,7 +102,8 @@ def test_a_calibration_s_own_camera_info_can_be_given_again(written, folder):
         folder / 'out' / 'calibration.yaml').read_text()
 
 
-def test_a_calibration_that_finds_no_room_leaves_the_one_that_stood_there(written, folder, tmp_path):
+def test_a_calibration_that_finds_no_room_leaves_the_one_that_stood_there(
+        written, folder, tmp_path):
     copytree(folder / 'out', tmp_path / 'out')
     with small_disk(50):
         said = refusal(folder / 'images', *OPTIONS, '--step-deg', STEP_DEG, '--camera-info',

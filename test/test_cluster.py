@@ -8,6 +8,7 @@ from pathlib import Path
 import shutil
 import signal
 import sys
+import time
 from types import SimpleNamespace
 
 from active_recon.cli import cluster_option, evaluation_plan
@@ -60,6 +61,14 @@ def test_one_process_several_and_a_cluster_give_the_same_results(crews):
     for opened in crews.values():
         with opened() as crew:
             assert results(crew, cluster_items.halved, iter(range(200))) == own
+
+
+def test_what_nobody_waits_for_any_more_ends_at_once_and_leaves_nothing(tmp_path):
+    begun = time.monotonic()
+    found = LocalCrew(2).map(partial(cluster_items.for_ever_but_the_first, tmp_path), range(3))
+    assert next(found) == Result(0, 0)
+    found.close()
+    assert time.monotonic() - begun < 60 and not list(tmp_path.iterdir())
 
 
 @pytest.mark.slow

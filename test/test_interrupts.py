@@ -11,6 +11,12 @@ from active_recon.interrupts import held_interrupts, stop_signals
 import pytest
 
 
+@pytest.fixture(autouse=True)
+def as_before(monkeypatch):
+    """Forget at the end that there was an interruption."""
+    monkeypatch.setattr('active_recon.interrupts._is_interrupted', False)
+
+
 @pytest.fixture
 def hangup():
     """Give the signal of a closed terminal what it had before."""
@@ -63,7 +69,7 @@ def test_a_command_hears_what_asks_it_to_stop_in_an_import_once_that_is_done(
 
 
 def test_a_command_that_is_stopped_while_it_is_imported_ends_without_a_word():
-    ended = subprocess.run([sys.executable, '-c', '''
+    ended = subprocess.run([sys.executable, '-c', """
 import os
 import signal
 import sys
@@ -77,7 +83,7 @@ class Stopping:
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background ignores Ctrl-C
 sys.meta_path.insert(0, Stopping())
 main()
-'''], capture_output=True, text=True, timeout=30, check=False)
+"""], capture_output=True, text=True, timeout=30, check=False)
     assert (ended.returncode, ended.stdout, ended.stderr) == (-signal.SIGINT, '', '')
 
 
@@ -88,6 +94,23 @@ def test_a_command_that_is_stopped_before_it_runs_ends_without_a_traceback(monke
     monkeypatch.setattr(commands, 'app', run)
     with pytest.raises(SystemExit, match='^130$'):
         commands.main()
+
+
+def test_what_a_library_makes_of_an_interruption_is_no_error_of_the_command(hangup, monkeypatch):
+    def run():
+        try:
+            os.kill(os.getpid(), signal.SIGTERM)
+            time.sleep(5)
+        except BaseException:
+            raise ValueError('could not determine the shape') from None
+
+    monkeypatch.setattr(commands, 'app', run)
+    before = signal.getsignal(signal.SIGTERM)
+    try:
+        with pytest.raises(SystemExit, match='^130$'):
+            commands.main()
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 @pytest.mark.parametrize('asked', [

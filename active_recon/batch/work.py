@@ -21,6 +21,7 @@ from active_recon.batch.task import state_of, Task
 from active_recon.cluster.results import is_no_room, UNEXPECTED
 from active_recon.cluster.stores import at_hand, Place, whole
 from active_recon.errors import ActiveReconError, DataError, WorkError
+from active_recon.interrupts import is_interrupted
 from active_recon.reconstructor import Reconstructor
 from active_recon.report.page import MAX_SUBJECTS, report_page
 from active_recon.report.subject import letters, object_of, Subject
@@ -67,6 +68,8 @@ def do_bag(task: Task, identity: str, bag: Place) -> BagDone:
         passing = isinstance(error, MemoryError)  # with fewer workers there may be enough
         result = BagResult('' if passing else state, [refusal_row(
             str(bag), f'{bag}: {type(error).__name__}: {error}', UNEXPECTED)])
+    if result.refused and is_interrupted():  # it would be kept of a bag that has nothing wrong
+        raise KeyboardInterrupt
     result.write(task.out, bag)
     return BagDone(result.refused, False)
 

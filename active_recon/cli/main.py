@@ -34,7 +34,12 @@ from active_recon.cli.train_segmenter import train_segmenter
 from active_recon.cli.up import up
 from active_recon.cli.view import view
 from active_recon.errors import ActiveReconError
-from active_recon.interrupts import interrupt, stop_signals
+from active_recon.interrupts import (
+    forget_interrupt,
+    interrupt,
+    is_interrupted,
+    stop_signals,
+)
 import typer
 
 app = typer.Typer(
@@ -95,13 +100,18 @@ def main() -> None:
         # Of a shell's background, Ctrl-C is not for the command
         if asked != signal.SIGINT or signal.getsignal(asked) != signal.SIG_IGN:
             signal.signal(asked, interrupt)
+    forget_interrupt()
     try:
         app()
-    except (ActiveReconError, OSError) as error:
-        sys.stderr.write(f'active-recon: {error}\n')
-        sys.exit(2)
     except KeyboardInterrupt:  # before typer, which builds all commands first, would take it
         sys.exit(130)
+    except Exception as error:
+        if is_interrupted():
+            sys.exit(130)
+        if not isinstance(error, (ActiveReconError, OSError)):
+            raise
+        sys.stderr.write(f'active-recon: {error}\n')
+        sys.exit(2)
     finally:
         # All that was imported ends with the process: looking through it takes 0.2 s
         gc.freeze()

@@ -35,34 +35,45 @@ class LocalCrew:
             for index, item in enumerate(items):
                 yield attempt(function, item).result(index)
             return
-        bundles = Bundles(items)
         with ExitStack() as stack:
-            idle: list[_Hand] = []
-            busy: dict[Future[Done], _Errand] = {}
-            while True:
-                while len(busy) < self.workers and (bundle := bundles.draw()):
-                    hand = idle.pop() if idle else _Hand(function, stack)
-                    errand = _Errand(hand, bundle)
+            hands: list[_Hand] = []
+            try:
+                yield from self._results(function, Bundles(items), stack, hands)
+            except (KeyboardInterrupt, GeneratorExit):  # nobody waits for what is being done
+                for hand in hands:
+                    hand.stop()
+                raise
+
+    def _results(self, function: Callable[[Any], Any], bundles: Bundles, stack: ExitStack,
+                 hands: 'list[_Hand]') -> Iterator[Result]:
+        idle: list[_Hand] = []
+        busy: dict[Future[Done], _Errand] = {}
+        while True:
+            while len(busy) < self.workers and (bundle := bundles.draw()):
+                if not idle:
+                    idle.append(_Hand(function, stack))
+                    hands += idle
+                errand = _Errand(idle.pop(), bundle)
+                busy[errand.begin()] = errand
+            if not busy:
+                return
+            finished, _ = wait(busy, return_when=FIRST_COMPLETED)
+            for future in finished:
+                errand = busy.pop(future)
+                done = errand.done(future)
+                if done is not None:
+                    bundles.learn(done)
+                    bundles.separate(errand.bundle[len(done.outcomes):])
+                    for (index, _), outcome in zip(errand.bundle, done.outcomes, strict=False):
+                        yield outcome.result(index)
+                elif len(errand.bundle) > 1:
+                    bundles.separate(errand.bundle)
+                elif errand.begun < ATTEMPTS:
                     busy[errand.begin()] = errand
-                if not busy:
-                    return
-                finished, _ = wait(busy, return_when=FIRST_COMPLETED)
-                for future in finished:
-                    errand = busy.pop(future)
-                    done = errand.done(future)
-                    if done is not None:
-                        bundles.learn(done)
-                        bundles.separate(errand.bundle[len(done.outcomes):])
-                        for (index, _), outcome in zip(errand.bundle, done.outcomes, strict=False):
-                            yield outcome.result(index)
-                    elif len(errand.bundle) > 1:
-                        bundles.separate(errand.bundle)
-                    elif errand.begun < ATTEMPTS:
-                        busy[errand.begin()] = errand
-                        continue
-                    else:
-                        yield DIED.result(errand.bundle[0][0])
-                    idle.append(errand.hand)
+                    continue
+                else:
+                    yield DIED.result(errand.bundle[0][0])
+                idle.append(errand.hand)
 
 
 class _Hand:
@@ -82,6 +93,10 @@ class _Hand:
         except BrokenProcessPool:  # it died between two items
             self.renew()
             return self._pool.submit(_work, items)
+
+    def stop(self) -> None:
+        """Let the process end what it is doing."""
+        self._pool.stop()
 
 
 @dataclass

@@ -2,14 +2,18 @@
 
 from collections.abc import Callable
 from concurrent.futures import Future, ProcessPoolExecutor
+from contextlib import suppress
 import multiprocessing
 import os
 import pickle
 import signal
 import threading
+from types import FrameType
 from typing import Any
 
-from active_recon.interrupts import held_interrupts
+from active_recon.interrupts import held_interrupts, interrupt
+
+_STOP = signal.SIGUSR1
 
 
 class WorkerPool(ProcessPoolExecutor):
@@ -32,9 +36,15 @@ class WorkerPool(ProcessPoolExecutor):
         try:
             # Another thread may get it, for this one: the pool could not end, half started
             with held_interrupts():
-                return super().submit(function, *given, **more)
+                return super().submit(_do, function, *given, **more)
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+    def stop(self) -> None:
+        """End what is being done: it raises KeyboardInterrupt, so that nothing of it stays."""
+        for process in list(self._processes):
+            with suppress(ProcessLookupError):
+                os.kill(process, _STOP)
 
 
 def _begin(pickled: bytes) -> None:
@@ -42,6 +52,7 @@ def _begin(pickled: bytes) -> None:
         signal.signal(signal.SIGINT, signal.SIG_DFL)  # there is nothing yet to lose or to tell
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
     pickle.loads(pickled)()
+    signal.signal(_STOP, _stop)
     for kind in (signal.SIGINT, signal.SIGHUP):
         signal.signal(kind, signal.SIG_IGN)
     parent = multiprocessing.parent_process()
@@ -52,3 +63,24 @@ def _begin(pickled: bytes) -> None:
         os._exit(1)
 
     threading.Thread(target=follow, daemon=True).start()
+
+
+_is_working = _is_stopped = False
+
+
+def _do(function: Callable[..., Any], *given: Any, **more: Any) -> Any:
+    global _is_working
+    if _is_stopped:
+        raise KeyboardInterrupt
+    _is_working = True
+    try:
+        return function(*given, **more)
+    finally:
+        _is_working = False
+
+
+def _stop(kind: int, frame: FrameType | None) -> None:
+    global _is_stopped
+    _is_stopped = True
+    if _is_working:  # elsewhere it would end the process with a traceback
+        interrupt(kind, frame)
