@@ -91,9 +91,11 @@ def test_a_lone_object_is_not_swapped_for_itself(dataset, tmp_path, monkeypatch,
     for part in (first.images_folder, first.voxels_path().parent):
         copytree(part, tmp_path / 'one' / part.relative_to(dataset))
     capsys.readouterr()
-    assert command(monkeypatch, tmp_path / 'one', '--policies', 'random,swapped', '--threads', 1,
-                   '--out', tmp_path) == 2
-    assert 'no other object to show: expected two or more' in capsys.readouterr().err
+    assert command(monkeypatch, dataset, tmp_path / 'one', '--policies', 'random,swapped',
+                   '--threads', 1, '--out', tmp_path) == 2
+    told = capsys.readouterr()
+    assert 'no other object to show: expected two or more' in told.err
+    assert 'choosing views' not in told.out + told.err  # of the other folder, for hours
 
 
 @pytest.mark.parametrize('name', ['policies', 'study'])

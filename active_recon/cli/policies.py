@@ -19,6 +19,7 @@ import typer
 if TYPE_CHECKING:
     from active_recon.evaluation.next_view.study import Episodes
     from active_recon.evaluation.posed.entrants import Entrant
+    from active_recon.evaluation.posed.scene import Scene
     from active_recon.evaluation.posed.study import Extent
 
 _UNLEARNED = [name for name, entry in POLICIES.items() if not entry.is_learned]
@@ -100,7 +101,10 @@ def policies(
     for folder in (*data, *([training] if training is not None else [])):
         chosen_folders(needed_objects(folder), category)
     require_policies(entrant, episodes)
-    require_writable_study(out, 'policies')  # all of this is told before hours of measuring
+    require_writable_study(out, 'policies')
+    # All of this, and which folder is unfit, is told before hours of measuring
+    scenes = [(folder, _read(folder, entrant, episodes, Extent(category, objects)))
+              for folder in data]
     result: dict[str, Any] = {
         'command': command_line(), 'model': entrant.name,
         'weights': entrant.weights, 'sets': []}
@@ -110,9 +114,10 @@ def policies(
                        'good', err=True)
         result['sequence'] = _sequence(training, entrant, episodes,
                                        Extent(category, training_objects))
-    for folder in data:
-        result['sets'].append(_set_figures(folder, entrant, episodes, Extent(category, objects),
-                                           result.get('sequence')))
+    for folder, scene in scenes:
+        result['sets'].append(
+            {'data': str(folder), 'category': category}
+            | _set_figures(folder, scene, entrant, episodes, result.get('sequence')))
         _write(result, out)  # what is done is kept, should a later folder fail
     for name in ('policies.json', 'policies.md'):
         typer.echo(f'wrote {out / name}')
@@ -133,24 +138,32 @@ def _sequence(folder: Path, entrant: 'Entrant', episodes: 'Episodes',
             'offsets_deg': np.degrees(offsets).round(1).tolist()}
 
 
-def _set_figures(folder: Path, entrant: 'Entrant', episodes: 'Episodes', extent: 'Extent',
-                 sequence: Mapping[str, Any] | None) -> dict[str, Any]:
-    from active_recon.evaluation.next_view.study import figures, run_episodes
+def _read(folder: Path, entrant: 'Entrant', episodes: 'Episodes', extent: 'Extent') -> 'Scene':
+    """Return a folder's objects; raises where the policies cannot be measured on them."""
+    from active_recon.evaluation.next_view.study import shown_views
     from active_recon.evaluation.next_view.swapping import require_same_cameras
     from active_recon.evaluation.posed.study import read_set
-    import numpy as np
 
     scene = read_set(folder, [entrant], extent, episodes.seed, progress_bar)
     print_left_out(folder.name, len(scene), (), scene.views.unreadable)
+    shown_views(scene, entrant)
     if any(name.startswith('swapped') for name in episodes.policies):
         if len(scene) < 2:
             raise DataError(f'{folder}: no other object to show: expected two or more for '
                             'swapped, got one; give more, or leave swapped out')
         require_same_cameras(scene.views)
+    return scene
+
+
+def _set_figures(folder: Path, scene: 'Scene', entrant: 'Entrant', episodes: 'Episodes',
+                 sequence: Mapping[str, Any] | None) -> dict[str, Any]:
+    from active_recon.evaluation.next_view.study import figures, run_episodes
+    import numpy as np
+
     offsets = None if sequence is None else np.radians(sequence['offsets_deg'])
     with progress_bar(f'choosing views of {folder.name}', len(scene)) as advance:
         found = run_episodes(scene, entrant, episodes, offsets, lambda done: advance(done, ''))
-    return {'data': str(folder), 'category': extent.category, 'objects': len(scene),
+    return {'objects': len(scene),
             'views': scene.view_count, 'starts': min(episodes.starts, scene.view_count),
             'side': max(side for side in entrant.sides if side in scene.truths),
             'unreadable': list(scene.views.unreadable), **figures(found)}

@@ -5,6 +5,7 @@ from dataclasses import asdict, dataclass
 import math
 from typing import Any
 
+from active_recon.datasets.views import ViewSet
 from active_recon.errors import ConfigError
 from active_recon.evaluation.next_view.choosing import (
     chosen_ahead,
@@ -104,6 +105,15 @@ def require_policies(entrant: Entrant, episodes: Episodes) -> None:
         plain, _ = _parted(name)
         if plain in (*POLICIES, SWAPPED, SWAPPED_TURNED):
             _policy(plain, [episodes.seed], entrant, episodes, None)
+
+
+def shown_views(scene: Scene, entrant: Entrant) -> ViewSet:
+    """Return the views of a set for a network; raises ConfigError where it cannot use them."""
+    shown = scene.shown_to(entrant.network)
+    if shown is None:
+        raise ConfigError(f'{entrant.name}: cannot be shown these views: expected a network that '
+                          'takes any cameras, such as lifting')
+    return shown
 
 
 def find_offsets(scene: Scene, entrant: Entrant, episodes: Episodes,
@@ -239,11 +249,7 @@ def _starts(scene: Scene, episodes: Episodes, row: int) -> list[int]:
 def _watched(scene: Scene, entrant: Entrant, episodes: Episodes, row: int,
              rendering: int | None, turn: np.random.Generator | None = None) -> WatchedObject:
     """Return one object of a set under a rendering, None: as it was; `turn` draws its yaw."""
-    shown = scene.shown_to(entrant.network)
-    if shown is None:
-        raise ConfigError(f'{entrant.name}: cannot be shown these views: expected a network that '
-                          'takes any cameras, such as lifting')
-    views = some_objects(shown, torch.tensor([row]))
+    views = some_objects(shown_views(scene, entrant), torch.tensor([row]))
     if turn is not None:
         views = turned(views, turn)
     if rendering is not None:
