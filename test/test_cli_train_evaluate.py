@@ -160,6 +160,17 @@ def test_a_training_that_is_interrupted_says_where_and_how_to_go_on(
     assert command(monkeypatch, *asked, '--resume') == 0
 
 
+def test_a_training_that_is_interrupted_after_its_steps_says_how_to_go_on(
+        dataset, tmp_path, monkeypatch, capsys):
+    def stopped(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr('active_recon.training.plan.best_threshold', stopped)
+    assert command(monkeypatch, *reconstructing(
+        dataset, tmp_path, '--policy-steps', 0, '--steps', 1)) == 130
+    assert 'stopped; continue with --resume' in capsys.readouterr().out
+
+
 def test_a_log_without_room_is_told_in_words_alone(tmp_path, monkeypatch):
     import threading
 

@@ -13,9 +13,11 @@ from active_recon.paper.results import Claim, Column, PUBLISHED, Result, Table
 from active_recon.paper.study import Objects, Study
 from active_recon.paper.writing import is_current, provenance, read_result, write_result
 from active_recon.reporting import silent
+from command_line import command
 import numpy as np
 from PIL import Image
 import pytest
+import torch
 
 OWN = Column('IoU', [Interval(0.5, 0.4, 0.6), None, 0.25])
 THEIRS = Column('PTN', [0.3, None, 0.4], published=True)
@@ -172,3 +174,13 @@ def test_results_are_ready_for_json(study):
 def test_weights_that_ship_are_named_without_the_folder_they_happen_to_lie_in(study):
     told = provenance(study, {}, {'ours': find_weights(PAPER_MODEL)})['weights']['ours']
     assert told['file'] == '2d3d-attention.safetensors, which ships'
+
+
+def test_the_command_that_is_stopped_says_how_to_go_on(tmp_path, monkeypatch, capsys):
+    def stopped(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr('active_recon.paper.parts.run_part', stopped)
+    assert command(monkeypatch, 'paper', 'table1', '--models', tmp_path, '--out', tmp_path,
+                   '--threads', torch.get_num_threads()) == 130
+    assert 'to continue run it again, without --again' in capsys.readouterr().out

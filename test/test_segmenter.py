@@ -185,6 +185,16 @@ def test_it_is_trained_and_resumed_from_the_command_line(lamps, tmp_path, monkey
     assert "begun_with: expected '' as before, got" in capsys.readouterr().err
 
 
+def test_a_stop_after_the_last_step_says_how_to_go_on(lamps, tmp_path, monkeypatch, capsys):
+    def stopped(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(silhouettes, 'silhouette_figures', stopped)
+    assert command(monkeypatch, 'train-segmenter', lamps, '--validation', lamps, '--steps', 1,
+                   '--batch-size', 1, '--init-from', '', '--out', tmp_path, '--threads', 1) == 130
+    assert 'stopped; continue with --resume' in capsys.readouterr().out
+
+
 @pytest.mark.parametrize('library', [
     'openvino', pytest.param('onnxruntime', marks=pytest.mark.slow)])
 def test_an_exported_segmenter_answers_as_in_torch(library, tmp_path):

@@ -25,23 +25,23 @@ def checkpoint_in(out: Path, resume: bool) -> Path:
 
 
 @contextmanager
-def shown_steps(title: str, steps: int) -> Iterator[Callable[[int, dict[str, float]], None]]:
-    """
-    Yield the report of a training, which takes each step and what was measured.
-
-    A training that is stopped ends the command with its message.
-    """
-    from active_recon.training.loop import TrainingStoppedError
-
+def resumable() -> Iterator[None]:
+    """Tell how to go on where a training, or what comes after its steps, is stopped."""
     try:
-        with progress_bar(title, steps) as advance:
-            reached = by_step(advance)
-
-            def report(step: int, measured: dict[str, float]) -> None:
-                reached(step, '  '.join(f'{name} {value:.4f}'
-                                        for name, value in measured.items()))
-
-            yield report
-    except TrainingStoppedError as stopped:
-        typer.echo(str(stopped))
+        yield
+    except KeyboardInterrupt as stopped:  # one of a step tells which
+        typer.echo(str(stopped) or 'stopped; continue with --resume')
         raise typer.Exit(130) from None
+
+
+@contextmanager
+def shown_steps(title: str, steps: int) -> Iterator[Callable[[int, dict[str, float]], None]]:
+    """Yield the report of a training, which takes each step and what was measured."""
+    with progress_bar(title, steps) as advance:
+        reached = by_step(advance)
+
+        def report(step: int, measured: dict[str, float]) -> None:
+            reached(step, '  '.join(f'{name} {value:.4f}'
+                                    for name, value in measured.items()))
+
+        yield report

@@ -111,9 +111,13 @@ def paper(
                   progress=progress_bar)
     weights_hash(study.weights)  # all of this is told before hours of training
     wanted = [*PARTS, DOCUMENT] if ALL in parts else list(dict.fromkeys(parts))
-    with workers_of(cluster, workers) if cluster else nullcontext() as crew:
-        for part in wanted:
-            _do(replace(study, crew=crew), part, again)
+    try:
+        with workers_of(cluster, workers) if cluster else nullcontext() as crew:
+            for part in wanted:
+                _do(replace(study, crew=crew), part, again)
+    except KeyboardInterrupt:
+        typer.echo('stopped; to continue run it again, without --again')
+        raise typer.Exit(130) from None
 
 
 def _do(study: 'Study', part: str, again: bool) -> None:

@@ -147,7 +147,7 @@ def train(
     from active_recon.models.weights import save_weights
     from active_recon.models.weights_files import find_weights
     from active_recon.shapes import generators_hash
-    from active_recon.training.loop import make_fabric, TrainingConfig, TrainingStoppedError
+    from active_recon.training.loop import make_fabric, TrainingConfig
     from active_recon.training.made_objects import MadeObjects
     from active_recon.training.plan import Plan, train_plan
     import torch
@@ -236,9 +236,9 @@ def train(
         try:
             bundle = train_plan(plan, training, held_out, out, log.reporting, fabric, resume,
                                 log.show)
-        except TrainingStoppedError as stopped:
+        except KeyboardInterrupt as stopped:  # one of a step tells which
             if fabric.is_global_zero:
-                typer.echo(str(stopped))
+                typer.echo(str(stopped) or 'stopped; continue with --resume')
             raise typer.Exit(130) from None
         if isinstance(training, MadeObjects) and fabric.is_global_zero:
             typer.echo(making_told(training))

@@ -5,7 +5,7 @@ from typing import Annotated
 
 from active_recon.cli.bf16_option import Bf16, trained_in_bf16
 from active_recon.cli.command_line import command_line
-from active_recon.cli.one_training import checkpoint_in, shown_steps
+from active_recon.cli.one_training import checkpoint_in, resumable, shown_steps
 from active_recon.cli.reading import read_objects, warn_of_shared_objects
 from active_recon.errors import ConfigError
 from active_recon.models.weights_files import DEFAULT_MODEL
@@ -83,11 +83,12 @@ def train_depth(
     config = DepthRefinerConfig(features=network.initial_state(1)['coarse_sum'].shape[1])
     refiner = DepthRefiner.begun_with(begun, config) if begun else DepthRefiner.from_config(config)
     begun_with, digest = state_hash(begun) if begun else '', weights_hash(path)
-    with shown_steps('depth', steps) as report:
-        train_depth(refiner, network, views, training,
-                    Run(fabric, checkpoint, report, resume, begun_with=begun_with),
-                    {'network_sha256': digest})
-    scale, bias = calibrate_depth(refiner.cpu(), network, held_out)
+    with resumable():
+        with shown_steps('depth', steps) as report:
+            train_depth(refiner, network, views, training,
+                        Run(fabric, checkpoint, report, resume, begun_with=begun_with),
+                        {'network_sha256': digest})
+        scale, bias = calibrate_depth(refiner.cpu(), network, held_out)
     typer.echo(f'calibrated on validation: {scale:.3f} logit {bias:+.3f}')
     written = out / depth_path(path).name
     save_refiner(written, refiner, config, digest, {

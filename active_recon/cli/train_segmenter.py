@@ -6,7 +6,7 @@ from typing import Annotated
 
 from active_recon.cli.bf16_option import Bf16, trained_in_bf16
 from active_recon.cli.command_line import command_line
-from active_recon.cli.one_training import checkpoint_in, shown_steps
+from active_recon.cli.one_training import checkpoint_in, resumable, shown_steps
 from active_recon.cli.progress import progress_bar
 from active_recon.cli.reading import read_objects, warn_of_shared_objects
 import typer
@@ -80,14 +80,15 @@ def train_segmenter(
         path = find_weights(init_from)
         begun_with = weights_hash(path)
         begin_with(segmenter, path)
-    with shown_steps('segmenter', steps) as report:
-        train_segmenter(segmenter, views, training, Run(
-            fabric, checkpoint, report, resume, begun_with=begun_with))
-    if not fabric.is_global_zero:
-        return
-    with progress_bar('validation', len(KINDS)) as advance:
-        figures = silhouette_figures(segmenter.cpu().eval(), held_out,
-                                     advance=partial(advance, 1))
+    with resumable():
+        with shown_steps('segmenter', steps) as report:
+            train_segmenter(segmenter, views, training, Run(
+                fabric, checkpoint, report, resume, begun_with=begun_with))
+        if not fabric.is_global_zero:
+            return
+        with progress_bar('validation', len(KINDS)) as advance:
+            figures = silhouette_figures(segmenter.cpu().eval(), held_out,
+                                         advance=partial(advance, 1))
     typer.echo('IoU of silhouettes on validation: '
                + ', '.join(f'{kind} {value:.3f}' for kind, value in figures.items()))
     written = out / 'segmenter.safetensors'
