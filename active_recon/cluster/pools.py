@@ -42,7 +42,7 @@ class WorkerPool(ProcessPoolExecutor):
 
     def stop(self) -> None:
         """End what is being done: it raises KeyboardInterrupt, so that nothing of it stays."""
-        for process in list(self._processes):
+        for process in list(self._processes or ()):  # none once it is shut down
             with suppress(ProcessLookupError):
                 os.kill(process, _STOP)
 

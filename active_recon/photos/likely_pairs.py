@@ -38,7 +38,8 @@ def _directions(descriptors: NDArray[np.uint8],
                 scales: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return the descriptors of the largest features as unit vectors, (M, 128)."""
     largest = descriptors[np.argsort(-scales, kind='stable')[:_LARGEST]].astype(np.float32)
-    return largest / np.maximum(np.linalg.norm(largest, axis=1, keepdims=True), 1)
+    lengths = np.linalg.norm(largest, axis=1, keepdims=True)
+    return np.asarray(largest / np.maximum(lengths, 1))
 
 
 def _matches(one: NDArray[np.float32], other: NDArray[np.float32]) -> int:
