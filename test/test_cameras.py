@@ -126,6 +126,16 @@ def test_rays_through_some_pixels_are_those_of_all_pixels(camera, samples):
         rtol=0, atol=0 if camera.intrinsics.distortion is None else 1e-9)
 
 
+@pytest.mark.parametrize('camera', BENT)
+def test_cameras_that_share_a_lens_have_the_same_rays_turned_by_their_poses(camera):
+    def in_the_optical_frame(each):
+        return each.ray_directions() @ each.pose[:3, :3]
+
+    other = Camera(orbit_camera(2.5).pose, camera.intrinsics)
+    np.testing.assert_allclose(in_the_optical_frame(other), in_the_optical_frame(camera),
+                               atol=1e-12)
+
+
 def test_the_canonical_camera_just_holds_the_grid_s_sphere():
     camera = orbit_camera(0.3)
     assert camera.distance == CANONICAL_DISTANCE

@@ -11,7 +11,7 @@ import math
 from typing import TypeVar
 
 from active_recon.errors import ViewError
-from active_recon.geometry.lenses import Distortion
+from active_recon.geometry.lenses import Distortion, undistorted_image
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -25,6 +25,7 @@ ELEVATION_TOLERANCE = math.radians(5)
 """Deviation from the canonical elevation beyond which there is a warning: not trained on."""
 CANONICAL_DISTANCE = 2.1
 """Distance of the canonical camera in sides of the voxel grid: the grid's sphere just fits."""
+_KEPT_PIXELS = 1 << 20
 
 
 _Azimuth = TypeVar('_Azimuth', float, NDArray[np.float64])
@@ -230,8 +231,12 @@ class Camera:
             rays: NDArray[np.float64] = (
                 across[None, :, None] * rightward + down[:, None, None] * downward + forward)
             return rays
-        seen = np.stack(np.meshgrid(across, down), axis=-1)
-        straight = lens.distortion.undistort(seen.reshape(-1, 2)).reshape(seen.shape)
+        if window is None and lens.width * lens.height <= _KEPT_PIXELS:
+            straight = undistorted_image(lens.distortion, (lens.fx, lens.fy), (lens.cx, lens.cy),
+                                         (lens.width, lens.height))
+        else:
+            seen = np.stack(np.meshgrid(across, down), axis=-1)
+            straight = lens.distortion.undistort(seen.reshape(-1, 2)).reshape(seen.shape)
         return np.asarray(straight[..., :1] * rightward + straight[..., 1:] * downward + forward)
 
 
