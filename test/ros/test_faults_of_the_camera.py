@@ -10,6 +10,7 @@ import logging
 import time
 
 from active_recon.models.weights_files import PAPER_MODEL
+from active_recon.parameters.shared import NetworkParameters
 from active_recon.simulation.faults import FAULTS
 from active_recon.simulation.shown_object import rendered_object
 import pytest
@@ -55,15 +56,15 @@ def shown(mesh):
 
 
 @pytest.fixture(scope='module')
-def one_thread():
+def as_many_threads_as_the_node():
     threads = torch.get_num_threads()
-    torch.set_num_threads(1)
+    torch.set_num_threads(NetworkParameters().threads)
     yield
     torch.set_num_threads(threads)
 
 
 @pytest.fixture(scope='module')
-def expected(one_thread, shown):
+def expected(as_many_threads_as_the_node, shown):
     return computed(shown, DEGREES)
 
 
