@@ -1,13 +1,12 @@
 """Image published to goal received: reconstructor and planner beside a camera, over DDS."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 import json
 import os
 from pathlib import Path
 from tempfile import TemporaryDirectory
 import time
-from types import MappingProxyType
 from typing import Any
 
 from active_recon.geometry.cameras import Camera
@@ -30,7 +29,7 @@ def goal_figures() -> list[Figure]:
     """Send raw images of 640 x 480 pixels; time the occupancy and the goal of each."""
     figures = []
     for more, where in (({}, ''), ({'threads': 1}, ', threads: 1')):
-        with loop_processes(more) as nodes, _camera() as send:
+        with loop_processes(**more) as nodes, _camera() as send:
             pids = [nodes.pid(node) for node in LOOP]
             figures += [*_measured(send, pids, where), memory_figure(pids, where)]
     return figures
@@ -73,8 +72,7 @@ def cpu_seconds(pids: list[int]) -> float:
 
 
 @contextmanager
-def loop_processes(more: Mapping[str, Any] = MappingProxyType({}),
-                   single: bool = False) -> Iterator[NodeProcesses]:
+def loop_processes(single: bool = False, **more: Any) -> Iterator[NodeProcesses]:
     """
     Start reconstructor and planner, each in a process or in one, in a domain of their own.
 

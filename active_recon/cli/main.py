@@ -34,12 +34,7 @@ from active_recon.cli.train_segmenter import train_segmenter
 from active_recon.cli.up import up
 from active_recon.cli.view import view
 from active_recon.errors import ActiveReconError
-from active_recon.interrupts import (
-    forget_interrupt,
-    interrupt,
-    is_interrupted,
-    stop_signals,
-)
+from active_recon.interrupts import forget_interrupt, interrupt, is_interrupted, stop_signals
 import typer
 
 app = typer.Typer(

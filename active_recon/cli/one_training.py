@@ -25,12 +25,17 @@ def checkpoint_in(out: Path, resume: bool) -> Path:
 
 
 @contextmanager
-def resumable() -> Iterator[None]:
-    """Tell how to go on where a training, or what comes after its steps, is stopped."""
+def resumable(tells: bool) -> Iterator[None]:
+    """
+    Tell how to go on where a training, or what comes after its steps, is stopped.
+
+    Of its processes one alone `tells`.
+    """
     try:
         yield
     except KeyboardInterrupt as stopped:  # one of a step tells which
-        typer.echo(str(stopped) or 'stopped; continue with --resume')
+        if tells:
+            typer.echo(str(stopped) or 'stopped; continue with --resume')
         raise typer.Exit(130) from None
 
 

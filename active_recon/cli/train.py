@@ -22,6 +22,7 @@ from active_recon.cli.made_objects import (
     warn_of_meshes,
 )
 from active_recon.cli.needed_options import refuse_idle, refuse_lone
+from active_recon.cli.one_training import resumable
 from active_recon.cli.reading import read_objects, Split, warn_of_shared_objects
 from active_recon.errors import ConfigError
 from active_recon.whole_files import writable
@@ -233,13 +234,9 @@ def train(
             warn_of_shared_objects(training.folders, held_out.folders,
                                    'the threshold is biased, and their IoU is too high')
         log = stack.enter_context(SummaryLog(out / 'tensorboard', held_out))
-        try:
+        with resumable(fabric.is_global_zero):
             bundle = train_plan(plan, training, held_out, out, log.reporting, fabric, resume,
                                 log.show)
-        except KeyboardInterrupt as stopped:  # one of a step tells which
-            if fabric.is_global_zero:
-                typer.echo(str(stopped) or 'stopped; continue with --resume')
-            raise typer.Exit(130) from None
         if isinstance(training, MadeObjects) and fabric.is_global_zero:
             typer.echo(making_told(training))
     if fabric.is_global_zero:

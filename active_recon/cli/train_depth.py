@@ -83,7 +83,7 @@ def train_depth(
     config = DepthRefinerConfig(features=network.initial_state(1)['coarse_sum'].shape[1])
     refiner = DepthRefiner.begun_with(begun, config) if begun else DepthRefiner.from_config(config)
     begun_with, digest = state_hash(begun) if begun else '', weights_hash(path)
-    with resumable():
+    with resumable(fabric.is_global_zero):
         with shown_steps('depth', steps) as report:
             train_depth(refiner, network, views, training,
                         Run(fabric, checkpoint, report, resume, begun_with=begun_with),

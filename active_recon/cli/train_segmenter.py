@@ -80,7 +80,7 @@ def train_segmenter(
         path = find_weights(init_from)
         begun_with = weights_hash(path)
         begin_with(segmenter, path)
-    with resumable():
+    with resumable(fabric.is_global_zero):
         with shown_steps('segmenter', steps) as report:
             train_segmenter(segmenter, views, training, Run(
                 fabric, checkpoint, report, resume, begun_with=begun_with))

@@ -50,10 +50,12 @@ class LocalCrew:
         busy: dict[Future[Done], _Errand] = {}
         while True:
             while len(busy) < self.workers and (bundle := bundles.draw()):
-                if not idle:
-                    idle.append(_Hand(function, stack))
-                    hands += idle
-                errand = _Errand(idle.pop(), bundle)
+                if idle:
+                    hand = idle.pop()
+                else:
+                    hand = _Hand(function, stack)
+                    hands.append(hand)
+                errand = _Errand(hand, bundle)
                 busy[errand.begin()] = errand
             if not busy:
                 return

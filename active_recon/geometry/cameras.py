@@ -7,11 +7,12 @@ counter-clockwise about +z from +x.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 import math
 from typing import TypeVar
 
 from active_recon.errors import ViewError
-from active_recon.geometry.lenses import Distortion, undistorted_image
+from active_recon.geometry.lenses import Distortion
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -223,21 +224,37 @@ class Camera:
         """
         width, height = self.intrinsics.width, self.intrinsics.height
         lens = self.intrinsics.resized(width * samples, height * samples)
-        left, top, right, bottom = (0, 0, width, height) if window is None else window
-        across = (np.arange(left * samples, right * samples) + 0.5 - lens.cx) / lens.fx
-        down = (np.arange(top * samples, bottom * samples) + 0.5 - lens.cy) / lens.fy
+        left, top, right, bottom = (
+            each * samples for each in (window or (0, 0, width, height)))
         rightward, downward, forward = self.pose[:3, :3].T
         if lens.distortion is None:
+            across, down = _normalised(lens, left, top, right, bottom)
             rays: NDArray[np.float64] = (
                 across[None, :, None] * rightward + down[:, None, None] * downward + forward)
             return rays
-        if window is None and lens.width * lens.height <= _KEPT_PIXELS:
-            straight = undistorted_image(lens.distortion, (lens.fx, lens.fy), (lens.cx, lens.cy),
-                                         (lens.width, lens.height))
-        else:
-            seen = np.stack(np.meshgrid(across, down), axis=-1)
-            straight = lens.distortion.undistort(seen.reshape(-1, 2)).reshape(seen.shape)
+        found = (_kept_undistorted if (right - left) * (bottom - top) <= _KEPT_PIXELS
+                 else _undistorted)
+        straight = found(lens, left, top, right, bottom)
         return np.asarray(straight[..., :1] * rightward + straight[..., 1:] * downward + forward)
+
+
+def _normalised(lens: Intrinsics, left: int, top: int, right: int, bottom: int
+                ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return x of a window's columns of pixels and y of its rows, at depth 1."""
+    return (np.asarray((np.arange(left, right) + 0.5 - lens.cx) / lens.fx, np.float64),
+            np.asarray((np.arange(top, bottom) + 0.5 - lens.cy) / lens.fy, np.float64))
+
+
+def _undistorted(lens: Intrinsics, left: int, top: int, right: int,
+                 bottom: int) -> NDArray[np.float64]:
+    """Return x and y that a window shows at depth 1, (height, width, 2), without distortion."""
+    assert lens.distortion is not None
+    seen = np.stack(np.meshgrid(*_normalised(lens, left, top, right, bottom)), axis=-1)
+    return lens.distortion.undistort(seen.reshape(-1, 2)).reshape(seen.shape)
+
+
+# Photos, and the images of a camera, share a lens: its points take far longer than their rays
+_kept_undistorted = lru_cache(maxsize=4)(_undistorted)
 
 
 class OrbitCamera(Camera):

@@ -6,7 +6,7 @@ The formulas are those of OpenCV's modules calib3d (plumb_bob, rational_polynomi
 """
 
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 import math
 
 from active_recon.errors import ViewError
@@ -125,23 +125,6 @@ class Distortion:
         return np.column_stack([
             x * along + 2 * p1 * x * y + p2 * (r2 + 2 * x * x) + r2 * (s1 + r2 * s2),
             y * along + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y + r2 * (s3 + r2 * s4)])
-
-
-@lru_cache(maxsize=4)  # photos and views share a lens, and each takes 0.1 s
-def undistorted_image(distortion: Distortion, focal: tuple[float, float],
-                      center: tuple[float, float], size: tuple[int, int]) -> NDArray[np.float64]:
-    """
-    Return the normalised points that the pixels of an image show, (height, width, 2), read-only.
-
-    `focal`, `center` and `size`, (width, height), are in pixels, x first. What was asked for last
-    is kept: it is for images of up to a million pixels.
-    """
-    across, down = ((np.arange(count) + 0.5 - middle) / length
-                    for count, middle, length in zip(size, center, focal, strict=True))
-    seen = np.stack(np.meshgrid(across, down), axis=-1)
-    straight = distortion.undistort(seen.reshape(-1, 2)).reshape(seen.shape)
-    straight.flags.writeable = False
-    return straight
 
 
 def _first_root(polynomial: Polynomial) -> float:

@@ -25,6 +25,7 @@ def likely_pairs(descriptors: Sequence[NDArray[np.uint8]],
     shared = np.zeros((len(looks), len(looks)), int)
     for one, other in combinations(range(len(looks)), 2):
         if len(looks[one]) and len(looks[other]):
+            # 0 is for photos without features
             shared[one, other] = shared[other, one] = 1 + _matches(looks[one], looks[other])
     chosen = set()
     for one, counts in enumerate(shared):

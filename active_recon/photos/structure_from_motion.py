@@ -152,7 +152,7 @@ def _cameras(colmap: Any, copies: Sequence[_Copy], folder: Path, own: Path, pati
             reached(done, 'features')
     pairing = colmap.ImportedPairingOptions()
     pairing.match_list_path, pairing.block_size = own / 'pairs.txt', _PAIRS_AT_ONCE
-    pairs = combinations(sorted(copy.name for copy in copies), 2) if patient else _likely_pairs(
+    pairs = combinations([copy.name for copy in copies], 2) if patient else _likely_pairs(
         colmap, database)
     pairing.match_list_path.write_text(''.join(f'{one} {other}\n' for one, other in pairs))
     colmap.match_image_pairs(database, matching, pairing, device=colmap.Device.cpu)
