@@ -13,7 +13,7 @@ from active_recon.acquisition.motion_cost import MotionCost, TimedMotion
 from active_recon.acquisition.view_gate import GOAL_TOLERANCE
 from active_recon.errors import ConfigError, ViewError
 from active_recon.geometry.cameras import Camera, CANONICAL_DISTANCE, OrbitCamera
-from active_recon.geometry.view_distance import on_one_ring, view_distance
+from active_recon.geometry.view_distance import on_one_ring, view_distance, view_distances
 from active_recon.policies import (
     AUTO_POLICY,
     Choice,
@@ -335,9 +335,8 @@ class Planner:
         """Make the best of a camera that no policy chose."""
         self._first = camera
         self._look_from(camera)
-        away = [view_distance(each, camera) for each in self._candidates]
-        self._wanted = Wanted(
-            self._places.goal(camera.azimuth, camera), -np.array(away, np.float32))
+        away = view_distances(self._candidates, [camera])[:, 0].astype(np.float32)
+        self._wanted = Wanted(self._places.goal(camera.azimuth, camera), -away)
         self._goal = self._best(camera)
 
     def _aim(self, camera: Camera) -> None:

@@ -72,8 +72,7 @@ def compressed_image_from_msg(msg: CompressedImage) -> NDArray[np.uint8]:
         return _decoded(msg)
     try:
         if image.has_transparency_data:
-            rgba = np.asarray(image.convert('RGBA'))
-            return over_white(np.ascontiguousarray(rgba[..., :3]), rgba[..., 3])
+            return over_white(np.asarray(image.convert('RGBA')))
         return np.asarray(image.convert('RGB'))
     except _UNREADABLE as error:
         raise _decoding_error(msg, str(error)) from error

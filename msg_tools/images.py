@@ -29,6 +29,7 @@ _TO_RGB = {'bgr8': cv2.COLOR_BGR2RGB, '8UC3': cv2.COLOR_BGR2RGB, 'mono8': cv2.CO
            'yuv422_yuy2': cv2.COLOR_YUV2RGB_YUY2, 'yuyv': cv2.COLOR_YUV2RGB_YUY2,
            'bayer_rggb8': cv2.COLOR_BayerRGGB2RGB, 'bayer_bggr8': cv2.COLOR_BayerBGGR2RGB,
            'bayer_gbrg8': cv2.COLOR_BayerGBRG2RGB, 'bayer_grbg8': cv2.COLOR_BayerGRBG2RGB}
+_BAND = 32  # rows that are worked on at once, so that they stay in a processor's cache
 _LEAST_BAYER = 3  # pixels a side: a smaller image has no pixel with all neighbours
 
 
@@ -49,8 +50,10 @@ def image_from_msg(msg: Image) -> NDArray[np.uint8]:
         return _from_float(pixels)
     if msg.encoding == 'rgb8':
         return pixels
-    color = np.asarray(cv2.cvtColor(pixels, _TO_RGB[msg.encoding]), np.uint8)
-    return over_white(color, pixels[..., 3]) if channels == 4 else color
+    to_rgb = _TO_RGB[msg.encoding]
+    if channels == 4:
+        return over_white(pixels, to_rgb)
+    return np.asarray(cv2.cvtColor(pixels, to_rgb), np.uint8)
 
 
 def image_size_from_msg(msg: Image) -> tuple[int, int]:
@@ -123,14 +126,24 @@ def depth_to_msg(metres: NDArray[np.floating], header: Header) -> Image:
     return _image_msg(np.asarray(metres, np.float32)[..., None], '32FC1', header)
 
 
-def over_white(color: NDArray[np.uint8], alpha: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Return an image, (H, W, 3), of straight alpha, (H, W), laid on white."""
-    if alpha.min() == 255:
-        return color
-    # 255 - (255 - color) alpha / 255: with odd 255 no value is halfway, so rounding is exact
-    alphas = cv2.cvtColor(alpha, cv2.COLOR_GRAY2RGB)
-    shade = cv2.multiply(cv2.bitwise_not(color), alphas, scale=1 / 255)
-    return np.asarray(cv2.bitwise_not(shade), np.uint8)
+def over_white(pixels: NDArray[np.uint8],
+               to_rgb: int = cv2.COLOR_RGBA2RGB) -> NDArray[np.uint8]:
+    """
+    Return an image of straight alpha, (H, W, 4), laid on white, (H, W, 3) RGB.
+
+    `to_rgb` is OpenCV's code of the conversion of its colours.
+    """
+    laid = np.empty((*pixels.shape[:2], 3), np.uint8)
+    for top in range(0, len(pixels), _BAND):
+        rows, color = pixels[top:top + _BAND], laid[top:top + _BAND]
+        cv2.cvtColor(rows, to_rgb, dst=color)
+        alpha = cv2.extractChannel(rows, 3)
+        if alpha.min() < 255:
+            # 255 - (255 - color) alpha / 255: with odd 255 no value is halfway, rounding is exact
+            cv2.bitwise_not(color, dst=color)
+            cv2.multiply(color, cv2.cvtColor(alpha, cv2.COLOR_GRAY2RGB), dst=color, scale=1 / 255)
+            cv2.bitwise_not(color, dst=color)
+    return laid
 
 
 def _image_msg(pixels: NDArray[Any], encoding: str,

@@ -12,6 +12,7 @@ from active_recon.geometry.view_distance import (
     nearest_camera,
     nearest_cameras,
     view_distance,
+    view_distances,
 )
 from active_recon.parameters.view_planner import ViewPlannerParameters
 from active_recon.planner import Planner
@@ -100,6 +101,15 @@ def test_the_nearest_camera_is_at_the_smallest_view_distance_and_of_equals_the_f
         min(range(len(AZIMUTHS)), key=lambda place, camera=camera: view_distance(
             places[place], camera)) for camera in cameras]
     assert len(nearest_cameras([], places)) == 0
+
+
+def test_the_distances_of_all_pairs_are_the_view_distance_of_each():
+    places = [orbit_camera(azimuth, 0.3, 2.0) for azimuth in AZIMUTHS]
+    cameras = [orbit_camera(0.37 * step, 0.1 * step) for step in range(12)]
+    np.testing.assert_allclose(
+        view_distances(cameras, places),
+        [[view_distance(camera, place) for place in places] for camera in cameras], atol=1e-15)
+    assert view_distances([], places).shape == (0, len(places))
 
 
 @pytest.mark.parametrize('kind', POLICIES)

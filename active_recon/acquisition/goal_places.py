@@ -18,7 +18,7 @@ from active_recon.geometry.cameras import (
     VIEW_COUNT,
     wrap_azimuth,
 )
-from active_recon.geometry.view_distance import view_distance
+from active_recon.geometry.view_distance import view_distances
 import numpy as np
 from numpy.typing import NDArray
 
@@ -198,11 +198,11 @@ def _listed(limits: MotionLimits, distance: float, views: Sequence[float]) -> Li
                               f'-{STEEPEST} to {STEEPEST} rad and distances of 0 m or more, got '
                               f'{elevation:g} and {away:g}')
     cameras = [orbit_camera(*place) for place in places]
-    for index, camera in enumerate(cameras):
-        if any(view_distance(camera, other) <= END_TOLERANCE for other in cameras[:index]):
-            raise ConfigError('reachable_views: two in one direction: expected each direction '
-                              f'once, got azimuth {camera.azimuth:g}, elevation '
-                              f'{camera.elevation:g} again')
+    again = np.tril(view_distances(cameras, cameras) <= END_TOLERANCE, -1).any(axis=1)
+    if again.any():
+        camera = cameras[int(again.argmax())]
+        raise ConfigError('reachable_views: two in one direction: expected each direction once, '
+                          f'got azimuth {camera.azimuth:g}, elevation {camera.elevation:g} again')
     if not limits.allows([place[0] for place in places]).any():
         raise ConfigError('azimuth_range, forbidden_sectors, reachable_views: no view left: '
                           'expected one where the camera can go, but together they leave none')

@@ -7,7 +7,7 @@ import math
 from active_recon.acquisition.motion import MotionLimits
 from active_recon.acquisition.motion_cost import MotionCost
 from active_recon.geometry.cameras import Camera, VIEW_COUNT
-from active_recon.geometry.view_distance import nearest_camera, nearest_cameras, view_distance
+from active_recon.geometry.view_distance import nearest_camera, nearest_cameras, view_distances
 import numpy as np
 from numpy.typing import NDArray
 
@@ -71,8 +71,7 @@ def best_goal(wanted: Wanted, candidates: Sequence[Camera], camera: Camera,
     is_open = limits.allows(azimuths) & ~is_failed
     eligible = is_open & ~is_taken
     if not eligible.any():  # the nearest to a view need not be where that was taken
-        eligible = is_open & ~np.array([any(view_distance(option, view) < _SAME_VIEW
-                                            for view in taken) for option in options])
+        eligible = is_open & ~(view_distances(options, taken) < _SAME_VIEW).any(axis=1)
     if not eligible.any():
         return None
     value = cost.utility(scores, wanted.is_gain, camera, options, limits)
