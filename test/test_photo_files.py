@@ -214,6 +214,15 @@ def test_a_folder_without_a_photo_is_refused(tmp_path):
         open_photos(photo_paths(tmp_path))
 
 
+def test_a_folder_whose_folders_have_the_photos_names_them(tmp_path):
+    for name in ('train_2/r_0.png', 'train_10/r_0.png', '.thumbnails/r_0.png', 'sparse/0.bin'):
+        (tmp_path / name).parent.mkdir()
+        (tmp_path / name).touch()
+    with pytest.raises(DataError, match='found none; give one of its folders that have some: '
+                                        'train_2, train_10$'):
+        photo_paths(tmp_path)
+
+
 def test_hidden_files_and_depth_are_no_photos_and_heic_is_told_of(tmp_path):
     Image.fromarray(drawn()).save(tmp_path / 'a.png')
     for name in ('.trashed-1-a.png', '._a.png', '~a.png', 'a_depth.png', 'b.HEIC'):

@@ -88,9 +88,23 @@ def photo_paths(place: Path | Sequence[Path]) -> list[Path]:
                         f'({", ".join(ENDINGS)})', 'no_photos')
     paths = sorted(filter(is_photo, place.iterdir()), key=in_order)
     if not paths:
-        raise DataError(f'{place}: no photos: expected files of {", ".join(ENDINGS)}, found none',
+        within = ', '.join(_folders_with_photos(place))
+        raise DataError(f'{place}: no photos: expected files of {", ".join(ENDINGS)}, found none'
+                        f'{within and f"; give one of its folders that have some: {within}"}',
                         'no_photos')
     return paths
+
+
+def _folders_with_photos(place: Path) -> list[str]:
+    """Return which folders in a folder have photos, by their names."""
+    found = []
+    for each in sorted(filter(Path.is_dir, place.iterdir()), key=in_order):
+        try:
+            if not each.name.startswith('.') and any(map(is_photo, each.iterdir())):
+                found.append(each.name)
+        except OSError:  # one that may not be looked into
+            continue
+    return found
 
 
 def open_photos(paths: Iterable[Path]) -> tuple[list[PhotoFile], list[str]]:
