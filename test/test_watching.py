@@ -11,7 +11,7 @@ from active_recon.cli.main import app
 from active_recon.errors import ConfigError, DataError
 from active_recon.photos.files import open_photo, open_photos
 from active_recon.photos.options import Options
-from active_recon.photos.reconstruct import from_files
+from active_recon.photos.reconstruct import from_files, from_views
 from active_recon.photos.sources import BoardCameras, posed_by, TurntableCameras
 from active_recon.policies.stopping import StoppingRule
 from active_recon.runtimes import precision
@@ -102,6 +102,26 @@ def test_what_is_wrong_with_a_photo_is_one_line_and_the_shape_stays(collection, 
         reason = collection.add(tmp_path / name)
         assert reason.startswith(f'{name}: {words}') and '\n' not in reason
     assert collection.shape.occupancy is before
+
+
+def test_photos_that_arrive_together_have_the_shape_and_the_faults_of_one_by_one(
+        collection, photos, tmp_path):
+    (tmp_path / 'cut.png').write_bytes(photos[0].read_bytes()[:20_000])
+    shutil.copy(photos[0], tmp_path / 'again.png')
+    found = Collection(SOURCE, Options())
+    assert found.add_all(photos[:2]) == ['', ''] and found.shape is None and found.count == 2
+    reasons = found.add_all([tmp_path / 'cut.png', photos[2], tmp_path / 'again.png'])
+    assert [reason.partition(':')[0] for reason in reasons] == ['cut.png', '', 'again.png']
+    np.testing.assert_allclose(found.shape.occupancy, collection.shape.occupancy, atol=_SAME)
+
+
+def test_one_shape_is_made_of_photos_that_arrive_together(posed, monkeypatch):
+    made = []
+    monkeypatch.setattr('active_recon.watching.collection.from_views', lambda views, *rest, **more:
+                        made.append(len(views)) or from_views(views, *rest, **more))
+    found = Collection(posed / 'transforms.json', Options())
+    found.add_all([posed / f'photo{number}.png' for number in range(4)])
+    assert made == [4] and len(found.shape.views) == 4
 
 
 def test_until_the_lens_is_known_it_is_said_what_is_missing(photos):
@@ -353,8 +373,7 @@ def test_the_loop_takes_photos_in_says_where_to_stand_and_has_a_result(posed, tm
         shutil.copy(posed / f'photo{number}.png', tmp_path)
     (tmp_path / '9.jpg').write_bytes(b'no photo')
     watcher.step(1.0)
-    for second in range(2, 6):
-        assert watcher.step(float(second))
+    assert sum(watcher.step(float(second)) for second in range(2, 6)) == 3  # of 1, 1 and 2 photos
     assert not watcher.step(9.0)
     assert [line for line in said if 'taken in' in line] == [
         f'photo{number}.png: taken in' for number in range(3)]
@@ -469,7 +488,8 @@ def test_a_photo_is_told_as_left_out_only_as_long_as_it_is(shape, adviser, tmp_p
             replace(shape.views[0], name=name) for name in used[path.name]])
         return ''.join(each for each in left_out if each.startswith(path.name))
 
-    found = SimpleNamespace(add=add, shape=None, metric=True, board=None, new_cameras=dict)
+    found = SimpleNamespace(add_all=lambda paths: list(map(add, paths)), count=0, shape=None,
+                            metric=True, board=None, new_cameras=dict)
     watcher = Watcher(tmp_path, found, adviser, print)
     for number, name in enumerate(used):
         (tmp_path / name).write_bytes(b'any')

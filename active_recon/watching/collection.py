@@ -1,6 +1,6 @@
 """The photos that came so far, each read and searched once, and the shape made of them."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -77,17 +77,16 @@ class Collection:
         """The board that poses the photos, if one does."""
         return self._source if isinstance(self._source, BoardCameras) else None
 
+    @property
+    def count(self) -> int:
+        """How many photos were taken in, whether or not the shape uses them."""
+        return len(self._kept)
+
     def add(self, path: Path) -> str:
         """Take in a photo; return why it is left out, in one line, '' where it is used."""
         digests = dict(self._digests)
-        self._digests = self._digests_without(path)
-        try:
-            photo = open_photo(path, self._digests)
-            seen = None if self.board is None else seen_board(photo, self.board.board)
-        except DataError as error:
-            self._digests = digests
-            return str(error)
-        self._kept[path] = _Kept(photo, seen)
+        if reason := self._open(path):
+            return reason
         had_shape = self.shape is not None
         try:
             self._update()
@@ -100,6 +99,37 @@ class Collection:
             self._digests = digests
             self._forget(path)  # the shape is still that of the others
             return f'{path.name}: {error}'
+        return self._left_out(path)
+
+    def add_all(self, paths: Sequence[Path]) -> list[str]:
+        """Take in photos as `add` does each, by one shape of all of them if there is one."""
+        if len(paths) > 1:
+            before = dict(self._kept), dict(self._views), dict(self._digests)
+            reasons = [self._open(path) for path in paths]
+            try:
+                self._update()
+            except ActiveReconError:  # one by one it is seen which of them is at fault
+                self._kept, self._views, self._digests = before
+            else:
+                return [reason or self._left_out(path)
+                        for path, reason in zip(paths, reasons, strict=True)]
+        return [self.add(path) for path in paths]
+
+    def _open(self, path: Path) -> str:
+        """Keep a photo; return why it cannot be read, else ''."""
+        digests = dict(self._digests)
+        self._digests = self._digests_without(path)
+        try:
+            photo = open_photo(path, self._digests)
+            seen = None if self.board is None else seen_board(photo, self.board.board)
+        except DataError as error:
+            self._digests = digests
+            return str(error)
+        self._kept[path] = _Kept(photo, seen)
+        return ''
+
+    def _left_out(self, path: Path) -> str:
+        """Return why the shape does not use a photo, '' where it does."""
         assert self.shape is not None
         return next((reason for reason in self.shape.left_out
                      if reason.startswith(f'{path.name}: ')), '')

@@ -107,9 +107,9 @@ class Watcher:
 
     def step(self, now: float) -> bool:
         """
-        Take in what has changed in the folder, at most one photo; return whether it was anything.
+        Take in what has changed in the folder, at most as many photos as there were before.
 
-        `now` is any clock in seconds.
+        Return whether it was anything. `now` is any clock in seconds.
         """
         if self._skips:
             self._leave_out(self._skips.popleft())
@@ -138,15 +138,18 @@ class Watcher:
             if gone or changed:
                 self._tell()
             return bool(gone) or changed
-        path = self._queue.pop(0)
-        left_out = self._collection.add(path)
-        if left_out:
-            self._left_out[path.name] = left_out
-            self._say(f'left out: {left_out}')
-        else:
-            self._say(f'{path.name}: taken in')
+        # A shape is made of all photos anew: one for each photo of a full folder would take long
+        count = max(1, self._collection.count)
+        taken, self._queue = self._queue[:count], self._queue[count:]
+        reasons = dict(zip((path.name for path in taken), self._collection.add_all(taken),
+                           strict=True))
+        for name, left_out in reasons.items():
+            if left_out:
+                self._left_out[name] = left_out
+            self._say(f'left out: {left_out}' if left_out else f'{name}: taken in')
         self._tell()
-        self.verdicts.put(path.name, left_out)
+        for name, left_out in reasons.items():
+            self.verdicts.put(name, left_out)
         return True
 
     def _leave_out(self, asked: '_Skip') -> None:
