@@ -66,7 +66,7 @@ def fit_arm(seen: Sequence[Detection], lens: Intrinsics, mounts: NDArray[np.floa
     own = np.kron(np.eye(count, dtype=bool), np.ones((1, 6), bool))
     depends = np.block([[np.ones((count, 12), bool), own],
                         [np.zeros((6 * count, 12), bool), np.eye(6 * count, dtype=bool)]])
-    found = fit(seen, lens, board_poses, np.append(start, exact),
-                lambda parameters: parameters[12:] / np.tile(_POSE_ERROR, count), depends)[:12]
+    found = fit(seen, lens, board_poses, np.append(start, exact), depends,
+                lambda parameters: parameters[12:] / np.tile(_POSE_ERROR, count))[:12]
     return ArmFit(rigid(found[:3], found[3:6]), rigid(found[6:9], found[9:]), begun.scale_known,
                   fitted_images(seen, lens, board_poses(np.append(found, exact))))

@@ -47,16 +47,16 @@ def overall_error(images: Sequence[ImageFit]) -> float:
 
 
 def fit(seen: Sequence[Detection], lens: Intrinsics, poses: BoardPoses,
-        start: NDArray[np.float64],
-        expected: Callable[[NDArray[np.float64]], NDArray[np.float64]] = lambda _: np.zeros(0),
-        depends: NDArray[np.bool_] | None = None) -> NDArray[np.float64]:
+        start: NDArray[np.float64], depends: NDArray[np.bool_],
+        expected: Callable[[NDArray[np.float64]], NDArray[np.float64]] = lambda _: np.zeros(0)
+        ) -> NDArray[np.float64]:
     """
     Return the parameters (P,) that minimise the reprojection error of the corners.
 
     `expected` returns M further residuals, the deviations of parameters from prior values in
     standard deviations. `depends` (N + M, P) marks the parameters on which each image, and then
-    each further residual, depends; None: all. The loss is soft L1, which limits the influence of
-    outliers.
+    each further residual, depends: without it the time would rise with the square of the number
+    of images. The loss is soft L1, which limits the influence of outliers.
     """
     def apart(parameters: NDArray[np.float64]) -> NDArray[np.float64]:
         off = [(project(lens, one.points, pose) - one.pixels).ravel()
@@ -64,11 +64,9 @@ def fit(seen: Sequence[Detection], lens: Intrinsics, poses: BoardPoses,
         together = np.concatenate([*off, expected(parameters)])
         return np.asarray(np.nan_to_num(together, nan=_BEHIND))
 
-    sparsity = None
-    if depends is not None:
-        counts = [2 * len(one.points) for one in seen]
-        sparsity = csr_matrix(np.repeat(
-            depends, [*counts, *[1] * (len(depends) - len(seen))], axis=0).astype(int))
+    counts = [2 * len(one.points) for one in seen]
+    sparsity = csr_matrix(np.repeat(
+        depends, [*counts, *[1] * (len(depends) - len(seen))], axis=0).astype(int))
     return np.asarray(least_squares(apart, start, x_scale='jac', loss='soft_l1', f_scale=_OUTLIER,
                                     jac_sparsity=sparsity, max_nfev=_MOST_STEPS).x)
 

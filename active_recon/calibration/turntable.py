@@ -74,7 +74,8 @@ def fit_turntable(seen: Sequence[Detection], lens: Intrinsics,
         table, board, turned = parts(parameters)
         return [table @ _about_z(angle) @ board for angle in turned]
 
-    found = fit(seen, lens, board_poses, start)
+    own = np.eye(len(seen), dtype=bool)[:, 1:]  # of the angles, an image tells of its own alone
+    found = fit(seen, lens, board_poses, start, np.hstack([np.ones((len(seen), 10), bool), own]))
     images = fitted_images(seen, lens, board_poses(found))
     table, board, turned = parts(found)
     if angles is None:
