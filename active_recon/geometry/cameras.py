@@ -93,7 +93,6 @@ class Intrinsics:
         return Intrinsics(self.fx * across, self.fy * down, self.cx * across, self.cy * down,
                           width, height, self.distortion)
 
-
     def reduced(self, by: int) -> 'Intrinsics':
         """
         Return the intrinsics of an image in which `by` x `by` pixels are one.
@@ -105,6 +104,13 @@ class Intrinsics:
             return self
         return Intrinsics(self.fx / by, self.fy / by, self.cx / by, self.cy / by,
                           -(-self.width // by), -(-self.height // by), self.distortion)
+
+    def pixels_of(self, x: NDArray[np.float64], y: NDArray[np.float64]
+                  ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the pixel coordinates of what is at x right and y down at depth 1, (...) each."""
+        if self.distortion is not None:
+            x, y = self.distortion.distorted(x, y)
+        return x * self.fx + self.cx, y * self.fy + self.cy
 
 
 _EYE, _LAST_ROW = np.eye(3), np.array([0.0, 0, 0, 1])
@@ -205,10 +211,8 @@ class Camera:
         # (3, N): what is done to a coordinate runs through memory in order
         optical = transform[:3, :3] @ np.asarray(points, np.float64).T + transform[:3, 3:]
         if self.intrinsics.distortion is not None:
-            depth = np.where(optical[2] > 0, optical[2], np.nan)
-            distorted = self.intrinsics.distortion.distort((optical[:2] / depth).T)
-            lens = self.intrinsics
-            return distorted * [lens.fx, lens.fy] + [lens.cx, lens.cy], optical[2]
+            x, y = optical[:2] / np.where(optical[2] > 0, optical[2], np.nan)
+            return np.stack(self.intrinsics.pixels_of(x, y), axis=1), optical[2]
         image = self.intrinsics.matrix @ optical
         with np.errstate(divide='ignore', invalid='ignore'):
             return (image[:2] / image[2]).T, optical[2]

@@ -24,6 +24,8 @@ REDUCTIONS = (8, 4, 2, 1)
 _CARRIED_SIDE = 512  # pixels of a lens with distortion, whose rays are slow to compute
 _BAND = 64
 """Rows of an image whose coordinates are computed at a time, to stay in the processor's cache."""
+_NOWHERE = -1e9
+"""A pixel coordinate outside of any image."""
 _Places = tuple[NDArray[np.float64], NDArray[np.float64]]
 """Coordinates across and down an image, (S, S) each, or (rows, S) of some of its rows."""
 
@@ -108,7 +110,7 @@ def carried_back(framed: NDArray[np.float32], target: Camera,
     few = Camera(camera.pose, lens.resized(round(lens.width / by), round(lens.height / by)))
     rays = few.ray_directions()
     pixels, depth = target.project((camera.position + rays).reshape(-1, 3))
-    pixels[~(depth > 0)] = -1e9  # nowhere in the image
+    pixels[~(depth > 0)] = _NOWHERE
     columns, rows = (each.reshape(rays.shape[:2]).astype(np.float32) - 0.5 for each in pixels.T)
     found = cv2.remap(framed, columns, rows, cv2.INTER_LINEAR)
     return np.asarray(cv2.resize(found, (lens.width, lens.height)))
@@ -138,29 +140,46 @@ def _seen(camera: Camera, target: Camera, size: int) -> _Places:
 
 
 def _seen_rows(camera: Camera, target: Camera, size: int) -> Callable[[slice], _Places]:
-    """Return what `_seen` does of the rows that it is asked for, each once."""
-    if camera.intrinsics.distortion is None and np.array_equal(camera.position, target.position):
-        fine = Camera(target.pose, target.intrinsics.resized(size, size))  # fifty times as fast
-        turn, across = turn_between(camera, fine), np.arange(size) + 0.5
+    """Return what `_seen` does of the rows that it is asked for."""
+    fine = Camera(target.pose, target.intrinsics.resized(size, size))
+    lens, centers = camera.intrinsics, np.arange(size) + 0.5
 
-        def turned_rows(band: slice) -> _Places:
-            x, y, depth = (row[0] * across + (row[1] * across[band] + row[2])[:, None]
-                           for row in turn)
-            np.copyto(depth, -1e-9, where=depth <= 0)
-            return np.divide(x, depth, out=x), np.divide(y, depth, out=y)
+    def rows_through(matrix: NDArray[np.float64], band: slice) -> Iterator[NDArray[np.float64]]:
+        return (row[0] * centers + (row[1] * centers[band] + row[2])[:, None] for row in matrix)
 
+    def turned_rows(band: slice) -> _Places:
+        x, y, depth = rows_through(turn, band)
+        np.copyto(depth, -1e-9, where=depth <= 0)
+        return np.divide(x, depth, out=x), np.divide(y, depth, out=y)
+
+    def projected_rows(band: slice) -> _Places:
+        x, y, depth = rows_through(plane, band)
+        behind = depth <= 0
+        np.copyto(depth, 1, where=behind)
+        x /= depth
+        y /= depth
+        x, y = (np.nan_to_num(each, copy=False, nan=_NOWHERE) for each in lens.pixels_of(x, y))
+        x[behind] = y[behind] = _NOWHERE
+        return x, y
+
+    if lens.distortion is None and np.array_equal(camera.position, target.position):
+        turn = turn_between(camera, fine)
         return turned_rows
-    x, y = _projected(camera, target, size)
-    return lambda band: (x[band], y[band])
+    plane = _plane_to_camera(fine, camera)
+    return projected_rows
 
 
-def _projected(camera: Camera, target: Camera, size: int) -> _Places:
-    """Return what `_seen` does of any two cameras."""
-    rays = Camera(target.pose, target.intrinsics.resized(size, size)).ray_directions()
-    pixels, depth = camera.project((target.position + target.distance * rays).reshape(-1, 3))
-    pixels[depth <= 0] = -1e9  # nowhere in the image
-    x, y = np.ascontiguousarray(np.nan_to_num(pixels, nan=-1e9).T)
-    return x.reshape(size, size), y.reshape(size, size)
+def _plane_to_camera(target: Camera, camera: Camera) -> NDArray[np.float64]:
+    """
+    Return the matrix (3, 3) from a target's pixels to coordinates in a camera's optical frame.
+
+    They are those of the points on the plane through the centre that faces the target.
+    """
+    to_camera = camera.pose[:3, :3].T
+    matrix = target.distance * (
+        to_camera @ target.pose[:3, :3] @ np.linalg.inv(target.intrinsics.matrix))
+    matrix[:, 2] += to_camera @ (target.position - camera.position)
+    return np.asarray(matrix)
 
 
 def turn_between(camera: Camera, target: Camera) -> NDArray[np.float64]:
