@@ -5,8 +5,7 @@ Each pixel is the object's or not by three witnesses: whether the board agrees w
 that is known, or what a segmenter says; its colour, beside those of the object and of the rest;
 and the other photos, in which a cell along its ray has to be the object too. Franco and Boyer,
 "Fusion of multi-view silhouette cues using a space occupancy grid", ICCV 2005. Neighbours without
-an edge between them are alike: Grady, "Multilabel random walker image segmentation using prior
-models", CVPR 2005.
+an edge between them are alike, as in `random_walker`.
 """
 
 from collections.abc import Callable, Sequence
@@ -18,14 +17,13 @@ from active_recon.geometry.framing import cube_corners
 from active_recon.photos.board_print import SeenBoard, UNIFORM
 from active_recon.photos.cube import Cube
 from active_recon.photos.ground import BOARD_GROUND
+from active_recon.photos.random_walker import smoothed, Ties
 from active_recon.photos.seen_photo import SeenPhoto
 from active_recon.volumes.voxels import cell_centers
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 from scipy.ndimage import gaussian_filter
-from scipy.sparse.linalg import cg
 
 CELLS = 48
 _BINS = 16
@@ -221,39 +219,27 @@ def _along_rays(odds: Logits, place: _Place, shape: tuple[int, ...]) -> Logits:
     return np.asarray(cv2.morphologyEx(drawn, cv2.MORPH_CLOSE, place.closed), np.float64)
 
 
-def _ties(photo: SeenPhoto, box: tuple[slice, slice]) -> sparse.csr_matrix:
+def _ties(photo: SeenPhoto, box: tuple[slice, slice]) -> Ties:
     """
-    Return how alike neighbours in a box of P pixels are, (P, P).
+    Return how alike neighbours in a box of pixels are.
 
     An edge that the board has there too is none.
     """
     image, expected, known = photo.image[box], photo.expected[box], photo.known[box]
-    number = np.arange(known.size).reshape(known.shape)
-    firsts, seconds, ties = [], [], []
-    for axis in (0, 1):
-        first, second = (np.take(number, np.arange(start, number.shape[axis] - 1 + start), axis)
-                         for start in (0, 1))
+    found = []
+    for axis in (1, 0):
         step = np.diff(image, axis=axis)
         apart = (step ** 2).sum(axis=-1)
-        both = known.ravel()[first] & known.ravel()[second]
         unprinted = ((step - np.diff(expected, axis=axis)) ** 2).sum(axis=-1)
+        both = np.logical_and(*(np.delete(known, end, axis) for end in (0, -1)))
         apart = np.where(both, np.minimum(apart, unprinted), apart)
-        firsts.append(first.ravel())
-        seconds.append(second.ravel())
-        ties.append(_TIES * (np.exp(-apart / (2 * _EDGE ** 2)) + 0.01).ravel())
-    rows, columns, weights = (np.concatenate(each) for each in (firsts, seconds, ties))
-    tied = sparse.coo_matrix((weights, (rows, columns)), (number.size,) * 2).tocsr()
-    return tied + tied.T
+        found.append((_TIES * (np.exp(-apart / (2 * _EDGE ** 2)) + 0.01)).astype(np.float32))
+    return Ties(*found)
 
 
-def _smooth(tied: sparse.csr_matrix, logits: Logits, box: tuple[slice, slice]
-            ) -> NDArray[np.float32]:
+def _smooth(ties: Ties, logits: Logits, box: tuple[slice, slice]) -> NDArray[np.float32]:
     """Return the object's share in each pixel, (H, W), alike in neighbours; 0 outside of a box."""
-    own = 1 / (1 + np.exp(-np.clip(logits[box], -_MOST, _MOST)))
-    certain = np.abs(2 * own - 1) + 0.02
-    diagonal = np.asarray(tied.sum(axis=1)).ravel() + certain.ravel()
-    solved, _ = cg(sparse.diags(diagonal) - tied, (certain * own).ravel(), own.ravel(),
-                   rtol=1e-3, maxiter=60, M=sparse.diags(1 / diagonal))
+    own = (1 / (1 + np.exp(-np.clip(logits[box], -_MOST, _MOST)))).astype(np.float32)
     found = np.zeros(logits.shape, np.float32)
-    found[box] = np.clip(solved, 0, 1).reshape(own.shape)
+    found[box] = np.clip(smoothed(ties, own, np.abs(2 * own - 1) + np.float32(0.02)), 0, 1)
     return found
