@@ -89,12 +89,13 @@ def package(tmp_path, monkeypatch):
     (tmp_path / 'mine.py').write_text(
         EXAMPLE.read_text() + '\nfrom active_recon.policies.geometric import FarthestPolicy\n'
         'class Near(FarthestPolicy):\n    pass\n'
-        'class Needy(FarthestPolicy):\n    def __init__(self, weight): pass\n')
+        'class Needy(FarthestPolicy):\n    def __init__(self, weight): pass\n'
+        'class Flat(Net):\n    def decode(self, state):\n        return state["latent"]\n')
     metadata = tmp_path / 'mine-1.0.dist-info'
     metadata.mkdir()
     (metadata / 'METADATA').write_text('Metadata-Version: 2.1\nName: mine\nVersion: 1.0\n')
     (metadata / 'entry_points.txt').write_text(
-        f'[{NETWORKS_GROUP}]\nmine = mine:Net\nbroken = mine:Nothing\n'
+        f'[{NETWORKS_GROUP}]\nmine = mine:Net\nflat = mine:Flat\nbroken = mine:Nothing\n'
         f'[{POLICIES_GROUP}]\nfar = mine:FarthestPolicy\nnear = mine:Near\nneedy = mine:Needy\n'
         'sizes = mine:Sizes\n')
     monkeypatch.syspath_prepend(tmp_path)
@@ -109,6 +110,15 @@ def test_what_an_installed_package_offers_is_known_by_its_name(package):
     assert _installed('far')(PolicyOptions()).initial_state(1) == {}
     with pytest.raises(ConfigError, match='broken: cannot be imported'):
         network_entry('broken')
+
+
+def test_a_network_of_an_installed_package_is_tried_before_it_is_trained(
+        package, dataset, tmp_path, monkeypatch, capsys):
+    threads = torch.get_num_threads()
+    line = refusal(monkeypatch, capsys, 'train', dataset, '--validation', dataset, '--out',
+                   tmp_path / 'run', '--model', 'flat', '--threads', 1)
+    torch.set_num_threads(threads)
+    assert 'flat: wrong occupancy: expected logits (2, 32, 32, 32) of decode' in line
 
 
 def test_what_an_installed_package_offers_as_a_policy_and_is_none_is_refused(package):
@@ -155,6 +165,7 @@ OWN = """
 from my_network import Net, Sizes
 from dataclasses import dataclass
 from active_recon.config import Config
+from active_recon.models.network import ReconstructionNetwork
 import torch
 
 class Unsaved(Net):
@@ -177,6 +188,13 @@ class NoLatent(Net):
 class Flat(Net):
     def decode(self, state):
         return super().decode(state).flatten(1)
+
+class NotFinite(Net):
+    def decode(self, state):
+        return super().decode(state) / 0
+
+class NoDecode(Net):
+    decode = ReconstructionNetwork.decode
 
 class AnyCamera(Net):
     needs_front = False
@@ -296,6 +314,8 @@ def test_a_network_whose_resolution_no_data_have_is_not_compared(own_file, tmp_p
 @pytest.mark.parametrize(('name', 'said'), [
     ('NoLatent', r'no latent: expected \(2, C, h, w\) .* got .*seen'),
     ('Flat', r'occupancy: expected logits \(2, 32, 32, 32\) of decode, got \(2, 32768\)'),
+    ('NotFinite', r'no usable occupancy: expected finite logits .* got 65536 of 65536 NaN or inf'),
+    ('NoDecode', r'cannot be built: expected a network of its Sizes\(channels=16\).*decode'),
     ('AnyCamera', r'on two views of \(2, 4, 64, 64\): RuntimeError'),
     ('Adding', 'the given state is modified: expected .* got other latent'),
     ('Replacing', 'the given state is modified: expected .* got other latent'),

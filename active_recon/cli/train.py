@@ -143,8 +143,13 @@ def train(
     from active_recon.cli.training_log import SummaryLog
     from active_recon.config import LossConfig, RewardConfig
     from active_recon.datasets.views import ViewSet
-    from active_recon.models.registry import named_network, network_entry, OWN_NETWORKS
-    from active_recon.models.trial import try_network
+    from active_recon.models.registry import (
+        named_network,
+        network_entry,
+        NETWORKS,
+        OWN_NETWORKS,
+    )
+    from active_recon.models.trial import built_and_tried
     from active_recon.models.weights import save_weights
     from active_recon.models.weights_files import find_weights
     from active_recon.shapes import generators_hash
@@ -212,9 +217,8 @@ def train(
     torch.manual_seed(seed)
     fabric = make_fabric(half, devices, nodes)
     fabric.launch()
-    network = entry.build(plan.config)
-    if own_file != model:
-        try_network(network, own_file)
+    network = (entry.build(plan.config) if model in NETWORKS
+               else built_and_tried(entry, plan.config, own_file))
     _refuse_unused({'--volume-weight': volume_weight, '--silhouette-weight': silhouette_weight,
                     '--volume-loss': volume_loss}, model, network)
     asked = network.spec

@@ -71,6 +71,11 @@ class DemoMonitor(LoopClient):
                                   self._node.get_subscriptions_info_by_topic(topic)}
                    for topic in RECORDED)
 
+    def problems_told(self) -> str:
+        """Return the problems that the loop's nodes report, to end a line; '' where none does."""
+        return ''.join(f'; {node}: {problem}'
+                       for node, problem in self._subscriber.problems().items())
+
     def change_state(self, node: str, transition: str, budget_s: float,
                      meanwhile: Callable[[], None]) -> bool:
         """Let a lifecycle node 'configure' or 'activate'; return whether it did."""

@@ -28,7 +28,11 @@ class LoopClient:
         """Spin until the condition holds; ActiveReconError after the budget."""
         if not self.within(condition, budget_s, meanwhile):
             raise ActiveReconError(f'timed out: expected {awaited} within {budget_s:g} s, '
-                                   'but it did not arrive')
+                                   f'but it did not arrive{self.problems_told()}')
+
+    def problems_told(self) -> str:
+        """Return what is known of why something did not arrive, to end a line; '' of nothing."""
+        return ''
 
     def within(self, condition: Callable[[], bool], budget_s: float,
                meanwhile: Callable[[], None]) -> bool:

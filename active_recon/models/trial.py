@@ -1,10 +1,23 @@
 """A trial of a network that may be somebody's own, before hours of training depend on it."""
 
+from active_recon.config import Config
 from active_recon.errors import ConfigError
 from active_recon.geometry.cameras import Camera, orbit_camera
 from active_recon.models.network import Cameras, ReconstructionNetwork
+from active_recon.models.registry import NetworkEntry
 import torch
 from torch import Tensor
+
+
+def built_and_tried(entry: NetworkEntry, config: Config, name: str) -> ReconstructionNetwork:
+    """Return a network that is somebody's own; raises ConfigError as `try_network` does."""
+    try:
+        network = entry.build(config)
+    except Exception as error:  # whatever its constructor raises
+        raise ConfigError(f'{name}: cannot be built: expected a network of its {config}, got '
+                          f'{type(error).__name__}: {error}') from error
+    try_network(network, name)
+    return network
 
 
 @torch.no_grad()
@@ -12,8 +25,9 @@ def try_network(network: ReconstructionNetwork, name: str) -> None:
     """
     Show a network two blank views of two objects, and look at what it returns.
 
-    Raises ConfigError in one line where it fails, modifies the state that it is given, or where
-    something has another shape than its interface tells, see `ReconstructionNetwork`.
+    Raises ConfigError in one line where it fails, modifies the state that it is given, where the
+    occupancy is not finite, or where something has another shape than its interface tells, see
+    `ReconstructionNetwork`.
     """
     side, cells = (getattr(network, each, None) for each in ('image_size', 'resolution'))
     front = getattr(network, 'needs_front', None)
@@ -44,6 +58,9 @@ def try_network(network: ReconstructionNetwork, name: str) -> None:
     if tuple(logits.shape) != (2, cells, cells, cells):
         raise ConfigError(f'{name}: wrong occupancy: expected logits (2, {cells}, {cells}, '
                           f'{cells}) of decode, got {tuple(logits.shape)}')
+    if not torch.isfinite(logits).all():
+        raise ConfigError(f'{name}: no usable occupancy: expected finite logits of decode, got '
+                          f'{(~torch.isfinite(logits)).sum()} of {logits.numel()} NaN or infinite')
     if latent is None or latent.ndim != 4 or len(latent) != 2:
         raise ConfigError(f'{name}: no latent: expected (2, C, h, w) as `latent` in the state, '
                           f'got {found}')

@@ -4,11 +4,15 @@ from io import StringIO
 from pathlib import Path
 
 from active_recon.demo.run import Demo, follow_loop
+from active_recon.errors import ActiveReconError
 from active_recon.geometry.cameras import orbit_camera
 from active_recon.launching.demo_monitor import DemoMonitor
 from active_recon.volumes.voxels import VoxelGrid
+from diagnostic_msgs.msg import DiagnosticArray
+from msg_tools.diagnostics import diagnostics_to_msg, NodeStatus
 from msg_tools.episodes import done_to_msg
 from msg_tools.loop import view_to_msgs
+from msg_tools.stamps import stamp_from_nanoseconds
 import numpy as np
 import pytest
 from rich.console import Console
@@ -62,3 +66,16 @@ def test_a_demo_whose_planner_is_done_waits_no_longer_for_views_that_were_missed
     shown = console.file.getvalue()
     assert 'done (max_views)' in shown
     assert said in shown if said else 'did not reach' not in shown
+
+
+def test_a_demo_that_waits_in_vain_tells_what_the_nodes_report(bench):
+    monitor = DemoMonitor(bench.node, bench.executor, lambda side: np.zeros((32,) * 3, bool))
+    publisher = bench.node.create_publisher(DiagnosticArray, '/diagnostics', 10)
+    reported = NodeStatus('/view_planner', problem='policy: fails with IndexError')
+
+    def report():
+        publisher.publish(diagnostics_to_msg(reported, stamp_from_nanoseconds(bench.now())))
+
+    with pytest.raises(ActiveReconError, match='expected view 2 within 1 s, but it did not '
+                       'arrive; view_planner: policy: fails with IndexError'):
+        monitor.until(lambda: monitor.has_views(2), 1.0, 'view 2', report)
