@@ -59,6 +59,12 @@ def test_poses_that_jump_are_told_within_a_second_and_no_more_a_second_after(rat
     assert not motion.monitor.faults()
 
 
+def test_the_poses_of_two_cameras_on_one_topic_are_told_with_what_may_be_behind_it():
+    motion = Motion()
+    motion.run(lambda now: 3.0 * (round(now * 30) % 2), 2.0)
+    assert 'as those of two publishers do' in motion.monitor.faults()['noisy_poses']
+
+
 def test_poses_that_tremble_less_than_a_still_camera_may_are_not_told():
     motion, rng = Motion(), np.random.default_rng(0)
     assert not motion.run(lambda now: rng.uniform(-STILL_ANGLE, STILL_ANGLE) / 2, 5.0)

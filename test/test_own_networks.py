@@ -76,6 +76,8 @@ def test_a_file_that_has_no_network_is_refused(tmp_path):
         named_network(f'{path}:Net')
     with pytest.raises(ConfigError, match='has no Other'):
         named_network(f'{path}:Other')
+    with pytest.raises(ConfigError, match=r'which network .* Expected .*mine\.py:Net, where'):
+        named_network(f'{path}')
     with pytest.raises(ConfigError, match='no such file'):
         load_from_file(f'{tmp_path}/none.py:Net')
     path.write_text('1 / 0\n')

@@ -49,7 +49,8 @@ class MotionMonitor:
         if jumps >= _JUMPS:
             faults['noisy_poses'] = (
                 f'noisy poses: expected a camera that moves and rests, they jumped {jumps} times '
-                f'in {_JUMPS_S:g} s; no view is taken until they are steady')
+                f'in {_JUMPS_S:g} s, as those of two publishers do; the camera does not count '
+                'as at rest until they are steady')
         stood = min(self._stillness.rested, (self._last - self._goal_since) / 1e9)
         if self._away > self.goal_tolerance and stood >= self.stall_timeout:
             faults['stalled'] = (

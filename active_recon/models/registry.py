@@ -88,9 +88,13 @@ def named_network(reference: str) -> str:
     """
     Return the name of a network, loading it where `reference` is of the form my_file.py:Net.
 
-    Raises ConfigError where the file has no such network, or its name is already taken.
+    Raises ConfigError where a file is named alone, has no such network, or its name is already
+    taken.
     """
     if not is_in_file(reference):
+        if reference.endswith('.py'):
+            raise ConfigError(f'{reference}: which network of this file? Expected '
+                              f'{reference}:Net, where Net is its class')
         return reference
     name = reference.rpartition(':')[2]
     if name in NETWORKS:
