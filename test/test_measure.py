@@ -4,7 +4,7 @@ import csv
 import json
 import math
 
-from active_recon.errors import DataError
+from active_recon.errors import DataError, WeightsError
 from active_recon.evaluation.ablations import iou_by_yaw, latent_swap_ablation, YAWS_DEG
 from active_recon.evaluation.measure import Episodes, interval, joined, run_policy, summary
 from active_recon.evaluation.metrics import episodes, iou_per_view
@@ -76,6 +76,14 @@ def test_a_run_measures_iou_both_entropies_and_azimuths_of_every_view(network, v
     assert run.entropy[0, 0] == pytest.approx(entropy(occupancy), rel=1e-4)
     assert run.paper_entropy[0, 0] == pytest.approx(paper_entropy(occupancy), rel=1e-4)
     assert (run.paper_entropy < run.entropy).all()
+
+
+def test_a_network_that_gives_nan_is_refused_and_not_measured_as_nothing(
+        network, views, monkeypatch):
+    decode = network.decode
+    monkeypatch.setattr(network, 'decode', lambda state: decode(state) * math.nan)
+    with pytest.raises(WeightsError, match='not finite: expected an occupancy of finite numbers'):
+        run_policy(network, UniformPolicy(2), views, *episodes(views, 1), 0.1, 2)
 
 
 @pytest.mark.slow

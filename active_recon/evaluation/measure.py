@@ -5,6 +5,7 @@ from dataclasses import asdict, dataclass, fields
 from typing import Any
 
 from active_recon.datasets.views import ViewSet
+from active_recon.errors import WeightsError
 from active_recon.evaluation.oracle import oracle_batch, roll_out_oracle
 from active_recon.evaluation.rollouts import batches, roll_out, Step
 from active_recon.evaluation.statistics import by_object, mean_interval
@@ -54,7 +55,11 @@ def joined(parts: Sequence[Episodes]) -> Episodes:
 
 
 def record(steps: Iterable[Step], truth: Tensor, threshold: float) -> Episodes:
-    """Return the results of B episodes, from their steps and the truth (B, X, Y, Z) bool."""
+    """
+    Return the results of B episodes, from their steps and the truth (B, X, Y, Z) bool.
+
+    Raises WeightsError where a step's occupancy is not finite.
+    """
     measured: list[tuple[Tensor, ...]] = []
     taken = np.empty((len(truth), 0))
     for step in steps:
@@ -63,6 +68,9 @@ def record(steps: Iterable[Step], truth: Tensor, threshold: float) -> Episodes:
                          entropy(occupancy), paper_entropy(occupancy)))
     found, full, paper = (torch.stack(each, dim=1).double().cpu().numpy()
                           for each in zip(*measured, strict=True))
+    if not np.isfinite(full).all():  # as of NaN, of which no cell would be above a threshold
+        raise WeightsError('not finite: expected an occupancy of finite numbers from the network, '
+                           'got NaN; take other weights, or measure with --no-bf16')
     return Episodes(found, full, paper, taken)
 
 
