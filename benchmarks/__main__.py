@@ -11,7 +11,12 @@ import sys
 
 from benchmarks.bags import replay_figure, report_figure
 from benchmarks.converters import converter_figures
-from benchmarks.core import episode_figures, rendering, rendering_of_candidates
+from benchmarks.core import (
+    episode_figures,
+    framing_figures,
+    rendering,
+    rendering_of_candidates,
+)
 from benchmarks.evaluation import evaluation_figures
 from benchmarks.figures import Figure, reference_ms
 from benchmarks.goal import goal_figures, single_process_figures
@@ -33,6 +38,7 @@ PARTS: Mapping[str, Callable[[], list[Figure]]] = {
     'evaluation': evaluation_figures,
     'published': published_figures,
     'rendering': lambda: [rendering(1, 400), rendering(2, 100)],
+    'framing': framing_figures,
     'candidates': lambda: [rendering_of_candidates(32), rendering_of_candidates(64)],
     'reconstructor': reconstructor_figures,
     'goal': goal_figures,

@@ -4,18 +4,21 @@ from collections.abc import Iterator
 from pathlib import Path
 import time
 
-from active_recon.geometry.cameras import AZIMUTHS, orbit_camera
+from active_recon.geometry.cameras import AZIMUTHS, Intrinsics, orbit_camera
+from active_recon.geometry.canonical import framed_image
+from active_recon.geometry.lenses import Distortion
 from active_recon.planner import Planner
 from active_recon.policies.candidate_rendering import coarse_volume, render_candidates
 from active_recon.reconstructor import Reconstructor
 from active_recon.volumes.meshes import load_mesh
 from active_recon.volumes.rendering import composite, Renderer
 from active_recon.volumes.voxels import PUBLISHED_FLOOR
-from benchmarks.figures import Figure, timed_ms
+from benchmarks.figures import Figure, interleaved, timed_ms
 import numpy as np
 
 OBJECTS = Path(__file__).parents[1] / 'active_recon' / 'objects'
 _EPISODES = 6
+IMAGE_SIZE = 128  # of the default network
 MODELS = Path(__file__).parent / 'real_cc0'
 
 
@@ -61,6 +64,20 @@ def rendering(samples: int, goal: float) -> Figure:
         rates.append(1e3 * len(cameras) / float(np.median(spent)))
     kind = 'flat' if samples == 1 else f'{samples} x {samples} antialiasing'
     return Figure(f'rendering, {kind}', 'views/s', rates, goal, more_is_better=True)
+
+
+def framing_figures() -> list[Figure]:
+    """Frame the object in images of 1280 x 720, as the network sees it, on one core."""
+    image = np.random.default_rng(0).integers(0, 256, (720, 1280, 3), np.uint8)
+    lenses = {'straight': None,
+              'with distortion': Distortion('plumb_bob', (-0.18, 0.06, 0.001, -0.0015, 0.0))}
+    cameras = {name: orbit_camera(0.7, 0.4, intrinsics=Intrinsics(
+        1400, 1400, 643, 358, 1280, 720, bent)) for name, bent in lenses.items()}
+    spent = interleaved({
+        f'an image of 1280 x 720 framed, lens {name}':
+        lambda c=camera: framed_image(image, c, image_size=IMAGE_SIZE)
+        for name, camera in cameras.items()})
+    return [Figure(name, 'ms', samples, None) for name, samples in spent.items()]
 
 
 def rendering_of_candidates(side: int) -> Figure:
