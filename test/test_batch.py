@@ -11,6 +11,7 @@ import shlex
 import shutil
 import signal
 import subprocess
+import sys
 
 from active_recon.bags.runs.loop_setup import Overrides
 from active_recon.bags.runs.reading import read_run
@@ -84,6 +85,18 @@ def test_bags_of_a_tree_are_found_once_and_in_order(tmp_path):
             find_roots([str(tmp_path / pattern)])
     with pytest.raises(ConfigError, match='ftp://fleet/day: no such storage'):
         find_roots(['ftp://fleet/day'])
+
+
+def test_what_a_killed_command_leaves_of_a_bag_is_none(tmp_path):
+    killed = subprocess.run([sys.executable, '-c', f"""
+import os, pathlib, signal
+from active_recon.bags.storage.atomic_bag import atomic_bag
+with atomic_bag(pathlib.Path({str(tmp_path / 'what_if')!r})):
+    os.kill(os.getpid(), signal.SIGKILL)
+"""], cwd=ROOT, check=False)
+    assert killed.returncode == -signal.SIGKILL
+    assert [path.name for path in tmp_path.rglob('*.mcap')] == ['what_if_0.mcap']
+    assert list(bags_below(tmp_path)) == []
 
 
 def test_a_bag_that_cannot_be_read_is_a_row_and_changes_no_other(

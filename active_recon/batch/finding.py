@@ -86,8 +86,9 @@ def bags_below(root: Place) -> Iterator[Place]:
     Yield the bags in a tree, in the order of their paths; a file that is named is one.
 
     A folder is a bag if it has metadata.yaml, or files that a recorder numbered after the folder;
-    every other MCAP or sqlite3 file is a bag by itself. Links to folders are not followed. A
-    folder that cannot be read is taken for a bag, which its worker refuses with the reason.
+    every other MCAP or sqlite3 file is a bag by itself. Hidden folders are left out, in which a
+    command that was killed leaves half a bag. Links to folders are not followed. A folder that
+    cannot be read is taken for a bag, which its worker refuses with the reason.
     """
     yield from _bags_in(root) if root.is_dir() else [root]
 
@@ -102,9 +103,11 @@ def _bags_in(folder: Place) -> Iterator[Place]:
         yield folder
         return
     for name, is_folder in entries:
+        if name.startswith('.'):
+            continue
         if is_folder:
             yield from _bags_in(folder / name)
-        elif name.endswith(_SUFFIXES) and not name.startswith('.'):
+        elif name.endswith(_SUFFIXES):
             yield folder / name
 
 
