@@ -47,6 +47,7 @@ def test_gains_are_kept_by_what_an_object_shows(tmp_path):
         image.write_bytes(content)
         names.append(_file(tmp_path, folder).name)
     folder.depth_path(0).write_bytes(b'depth, which no gain is measured by')
+    (folder.images_folder / '.01.png.5f0c12ab.part').write_bytes(b'half an image of a killed run')
     assert names[0] == names[2] == _file(tmp_path, folder).name != names[1]
     assert names[0].startswith('table__one-')
 

@@ -141,7 +141,8 @@ def _keep_apart(out: Path, collected: dict[str, Any]) -> None:
 def _file(out: Path, folder: ObjectFolder) -> Path:
     """Return where an object's gains are kept: by what it shows, as a dataset may be made anew."""
     shown = hashlib.sha256()
-    for path in (*sorted(folder.images_folder.glob('*')),
+    # No hidden files, which a `render` that was killed leaves there
+    for path in (*sorted(folder.images_folder.glob('[!.]*')),
                  *(folder.voxels_path(side) for side in (RESOLUTION, FINE_RESOLUTION))):
         if path.is_file() and not path.name.endswith('_depth.png'):
             shown.update(path.read_bytes())
