@@ -15,6 +15,7 @@ from active_recon.models.weights_files import depth_path, weights_hash
 from active_recon.reconstructor import Reconstructor
 from active_recon.runtimes import load_depth_runtime
 from active_recon.runtimes.graph_files import graph_path, NETWORK_PARTS
+from active_recon.runtimes.precision import has_bf16
 from active_recon.saved_states import read_state, SavedState, write_state
 from active_recon.volumes.depth_images import DepthImage
 import numpy as np
@@ -166,17 +167,31 @@ def test_a_state_with_depth_is_not_gone_on_from_without_a_refiner(weights, tmp_p
     assert plain.progress.state is before.state
 
 
-def test_the_exported_refiner_answers_as_torch_does(weights):
+def refined(weights, runtime, precision):
+    """Return what a runtime makes of numbers drawn at random."""
     rng = np.random.default_rng(0)
     occupancy = rng.random((64, 64, 64)).astype(np.float32)
     evidence = rng.random((3, 64, 64, 64)).astype(np.float32)
     state = {'coarse_count': np.full((1, 1, 16, 16, 16), 2, np.float32),
              'coarse_sum': rng.standard_normal((1, TINY.coarse_channels, 16, 16, 16), np.float32)}
-    expected, *others = (
-        load_depth_runtime(weights, name, threads=1).refine(occupancy, evidence, state)
-        for name in ('torch', 'openvino', 'onnxruntime'))
+    return load_depth_runtime(weights, runtime, threads=1, precision=precision).refine(
+        occupancy, evidence, state)
+
+
+def test_the_exported_refiner_answers_as_torch_does(weights):
+    expected, *others = (refined(weights, name, 'f32')
+                         for name in ('torch', 'openvino', 'onnxruntime'))
     for found in others:
         np.testing.assert_allclose(found, expected, atol=1e-4)
+
+
+@pytest.mark.skipif(not has_bf16(), reason='this processor has no bf16')
+def test_the_refiner_is_as_precise_as_the_network_is_asked_to_be(weights):
+    exact = refined(weights, 'openvino', 'f32')
+    for precision in ('auto', 'bf16'):
+        half = refined(weights, 'openvino', precision)
+        assert (half != exact).any()
+        np.testing.assert_allclose(half, exact, atol=0.05)
 
 
 def test_weights_are_read_as_they_were_written(weights):

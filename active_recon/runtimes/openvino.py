@@ -96,8 +96,7 @@ def load_policy(weights: Path | None, device: str, threads: int | None,
 def load_depth(weights: Path | None, device: str, threads: int | None,
                precision: str) -> ExportedDepthRuntime:
     """Return the depth refiner that was exported beside weights; see `load_depth_runtime`."""
-    chosen_precision(precision, device)
-    opener = _Opener(threads, 'f32')
+    opener = _float_opener(threads, precision, device)
     loaded = open_depth(weights, opener)
     loaded.provenance = opener.provenance
     return loaded
@@ -106,11 +105,16 @@ def load_depth(weights: Path | None, device: str, threads: int | None,
 def load_segmenter(weights: Path, device: str, threads: int | None,
                    precision: str) -> ExportedSegmenterRuntime:
     """Return the exported segmenter; see `load_segmenter_runtime`."""
-    chosen = chosen_precision(precision, device)
-    opener = _Opener(threads, 'bf16' if chosen == INT8 and has_bf16() else chosen)
+    opener = _float_opener(threads, precision, device)
     loaded = open_segmenter(weights, opener)
     loaded.provenance = opener.provenance
     return loaded
+
+
+def _float_opener(threads: int | None, precision: str, device: str) -> '_Opener':
+    """Return what opens graphs that have no form in integers."""
+    chosen = chosen_precision(precision, device)
+    return _Opener(threads, 'bf16' if chosen == INT8 and has_bf16() else chosen)
 
 
 class _Opener:
