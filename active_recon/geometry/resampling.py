@@ -143,30 +143,23 @@ def _seen_rows(camera: Camera, target: Camera, size: int) -> Callable[[slice], _
     """Return what `_seen` does of the rows that it is asked for."""
     fine = Camera(target.pose, target.intrinsics.resized(size, size))
     lens, centers = camera.intrinsics, np.arange(size) + 0.5
+    is_turned = lens.distortion is None and np.array_equal(camera.position, target.position)
+    matrix = turn_between(camera, fine) if is_turned else _plane_to_camera(fine, camera)
 
-    def rows_through(matrix: NDArray[np.float64], band: slice) -> Iterator[NDArray[np.float64]]:
-        return (row[0] * centers + (row[1] * centers[band] + row[2])[:, None] for row in matrix)
-
-    def turned_rows(band: slice) -> _Places:
-        x, y, depth = rows_through(turn, band)
-        np.copyto(depth, -1e-9, where=depth <= 0)
-        return np.divide(x, depth, out=x), np.divide(y, depth, out=y)
-
-    def projected_rows(band: slice) -> _Places:
-        x, y, depth = rows_through(plane, band)
+    def some_rows(band: slice) -> _Places:
+        x, y, depth = (row[0] * centers + (row[1] * centers[band] + row[2])[:, None]
+                       for row in matrix)
         behind = depth <= 0
-        np.copyto(depth, 1, where=behind)
+        np.copyto(depth, -1e-9 if is_turned else 1, where=behind)
         x /= depth
         y /= depth
+        if is_turned:
+            return x, y
         x, y = (np.nan_to_num(each, copy=False, nan=_NOWHERE) for each in lens.pixels_of(x, y))
         x[behind] = y[behind] = _NOWHERE
         return x, y
 
-    if lens.distortion is None and np.array_equal(camera.position, target.position):
-        turn = turn_between(camera, fine)
-        return turned_rows
-    plane = _plane_to_camera(fine, camera)
-    return projected_rows
+    return some_rows
 
 
 def _plane_to_camera(target: Camera, camera: Camera) -> NDArray[np.float64]:

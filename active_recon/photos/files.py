@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 import hashlib
 import math
@@ -98,12 +99,11 @@ def photo_paths(place: Path | Sequence[Path]) -> list[Path]:
 def _folders_with_photos(place: Path) -> list[str]:
     """Return which folders in a folder have photos, by their names."""
     found = []
-    for each in sorted(filter(Path.is_dir, place.iterdir()), key=in_order):
-        try:
-            if not each.name.startswith('.') and any(map(is_photo, each.iterdir())):
+    for each in sorted(place.iterdir(), key=in_order):
+        with suppress(OSError):  # of one that may not be looked into
+            if (each.is_dir() and not each.name.startswith('.')
+                    and any(map(is_photo, each.iterdir()))):
                 found.append(each.name)
-        except OSError:  # one that may not be looked into
-            continue
     return found
 
 
