@@ -20,6 +20,7 @@ _LARGEST = 1e6  # larger than in any lens, and its sixth power does not overflow
 _STEP = 1e-6
 _CLOSE = 1e-10  # at depth 1
 _HALVINGS = 6  # of a step of Newton's that leads away
+_MOST_STEPS = 60  # of them, for the few points beside the fold
 _STEEPEST = 3.0  # of any lens: beyond, a model is beside a pole, as fits of 8 coefficients have
 _WITHIN = 0.9999  # at the maximum radius itself a model may divide by 0
 
@@ -83,7 +84,7 @@ class Distortion:
         """
         found, open_ones = points.copy(), np.arange(len(points))
         wrong = self.distort(points) - points
-        for _ in range(20):  # Newton's steps; a handful is enough but at the edge of the field
+        for _ in range(_MOST_STEPS):  # a handful is enough but at the edge of the field
             near, there = found[open_ones], points[open_ones]
             across, down = ((self.distort(near + step) - self.distort(near - step)) / (2 * _STEP)
                             for step in np.eye(2) * _STEP)
