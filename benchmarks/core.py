@@ -7,6 +7,7 @@ import time
 from active_recon.geometry.cameras import AZIMUTHS, Intrinsics, orbit_camera
 from active_recon.geometry.canonical import framed_image
 from active_recon.geometry.lenses import Distortion
+from active_recon.models.lifting_encoder import IMAGE_SIZE
 from active_recon.planner import Planner
 from active_recon.policies.candidate_rendering import coarse_volume, render_candidates
 from active_recon.reconstructor import Reconstructor
@@ -18,7 +19,6 @@ import numpy as np
 
 OBJECTS = Path(__file__).parents[1] / 'active_recon' / 'objects'
 _EPISODES = 6
-IMAGE_SIZE = 128  # of the default network
 MODELS = Path(__file__).parent / 'real_cc0'
 
 

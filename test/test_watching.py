@@ -115,13 +115,15 @@ def test_photos_that_arrive_together_have_the_shape_and_the_faults_of_one_by_one
     np.testing.assert_allclose(found.shape.occupancy, collection.shape.occupancy, atol=_SAME)
 
 
-def test_one_shape_is_made_of_photos_that_arrive_together(posed, monkeypatch):
+def test_one_shape_is_made_of_photos_that_arrive_or_go_together(posed, monkeypatch):
     made = []
     monkeypatch.setattr('active_recon.watching.collection.from_views', lambda views, *rest, **more:
                         made.append(len(views)) or from_views(views, *rest, **more))
     found = Collection(posed / 'transforms.json', Options())
     found.add_all([posed / f'photo{number}.png' for number in range(4)])
     assert made == [4] and len(found.shape.views) == 4
+    found.remove(posed / 'photo0.png', posed / 'photo3.png', posed / 'none.png')
+    assert made == [4, 2] and found.count == 2
 
 
 def test_until_the_lens_is_known_it_is_said_what_is_missing(photos):
@@ -489,7 +491,7 @@ def test_a_photo_is_told_as_left_out_only_as_long_as_it_is(shape, adviser, tmp_p
         return ''.join(each for each in left_out if each.startswith(path.name))
 
     found = SimpleNamespace(add_all=lambda paths: list(map(add, paths)), count=0, shape=None,
-                            metric=True, board=None, new_cameras=dict)
+                            remove=lambda *paths: None, metric=True, board=None, new_cameras=dict)
     watcher = Watcher(tmp_path, found, adviser, print)
     for number, name in enumerate(used):
         (tmp_path / name).write_bytes(b'any')

@@ -134,12 +134,14 @@ class Collection:
         return next((reason for reason in self.shape.left_out
                      if reason.startswith(f'{path.name}: ')), '')
 
-    def remove(self, path: Path) -> None:
-        """Leave out a photo that is gone; the shape becomes that of the others."""
-        if path not in self._kept:
+    def remove(self, *paths: Path) -> None:
+        """Leave out photos that are gone; the shape becomes that of the others."""
+        gone = [path for path in paths if path in self._kept]
+        if not gone:
             return
-        self._forget(path)
-        self._digests = self._digests_without(path)
+        for path in gone:
+            self._forget(path)
+            self._digests = self._digests_without(path)
         try:
             self._update()
         except ActiveReconError as error:

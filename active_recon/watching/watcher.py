@@ -115,9 +115,9 @@ class Watcher:
             self._leave_out(self._skips.popleft())
             return True
         gone = self._arrivals.gone()
+        self._collection.remove(*gone)
         for path in gone:
             self._left_out.pop(path.name, None)
-            self._collection.remove(path)
             for name in [name for name, why in self._left_out.items()
                          if why.endswith(f': the same photo as {path.name}')]:
                 del self._left_out[name]
