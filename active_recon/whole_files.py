@@ -1,12 +1,13 @@
 """Files that are written whole or not at all."""
 
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, ExitStack, suppress
 from pathlib import Path
 from secrets import token_hex
 import tempfile
 
 from active_recon.errors import ConfigError
+from active_recon.interrupts import held_interrupts
 
 
 @contextmanager
@@ -29,6 +30,21 @@ def whole_file(path: Path) -> Iterator[Path]:
                 and error.filename in (None, str(unfinished)) and error.filename2 is None):
             error.filename = str(path)
         raise
+
+
+@contextmanager
+def unfinished_folder(place: Path | None, prefix: str = '.') -> Iterator[Path]:
+    """
+    Yield a new folder in another, or where temporary files are; it goes when the block ends.
+
+    A command that is stopped leaves none: between the making of a folder and the noting that it
+    has to go, it is not.
+    """
+    with ExitStack() as stack:
+        with held_interrupts():
+            folder = stack.enter_context(tempfile.TemporaryDirectory(
+                prefix=prefix, dir=place, ignore_cleanup_errors=True))
+        yield Path(folder)
 
 
 def writable(path: Path) -> Path:

@@ -11,9 +11,9 @@ ROOT = Path(__file__).parents[1]
 PACKAGES = ('active_recon', 'msg_tools')
 # A subpackage imports itself and what stands in the rows above its own
 ROWS: tuple[set[str], ...] = (
-    {'errors'},
-    {'config', 'file_names', 'freed_memory', 'geometry', 'interrupts', 'json_text',
-     'npz_files', 'objects', 'plugins', 'reporting', 'view_colors', 'whole_files', 'yaml_text'},
+    {'errors', 'interrupts'},
+    {'config', 'file_names', 'freed_memory', 'geometry', 'json_text', 'npz_files', 'objects',
+     'plugins', 'reporting', 'view_colors', 'whole_files', 'yaml_text'},
     {'cluster', 'png_files', 'volumes'},
     {'acquisition', 'calibration', 'meshes', 'models', 'quality', 'shapes'},
     {'capture', 'datasets', 'runtimes'},

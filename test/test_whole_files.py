@@ -1,7 +1,11 @@
 """A file is written whole, or what stood in its place stays."""
 
+import os
+import signal
+
 from active_recon.errors import ConfigError
-from active_recon.whole_files import whole_file, writable
+from active_recon.interrupts import forget_interrupt, interrupt
+from active_recon.whole_files import unfinished_folder, whole_file, writable
 from command_line import refusal
 import pytest
 
@@ -93,4 +97,22 @@ def test_what_cannot_be_written_is_told_before_the_work(
 def test_a_study_whose_options_are_refused_makes_no_folder(asked, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     refusal(monkeypatch, capsys, *asked, '--out', 'new')
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_command_stopped_while_it_makes_a_folder_leaves_none(monkeypatch, tmp_path):
+    make = os.mkdir
+
+    def make_and_be_stopped(*args, **kwargs):
+        make(*args, **kwargs)
+        os.kill(os.getpid(), signal.SIGTERM)
+
+    before = signal.signal(signal.SIGTERM, interrupt)
+    try:
+        monkeypatch.setattr(os, 'mkdir', make_and_be_stopped)
+        with pytest.raises(KeyboardInterrupt), unfinished_folder(tmp_path):
+            pytest.fail('the block ran')
+    finally:
+        signal.signal(signal.SIGTERM, before)
+        forget_interrupt()
     assert not list(tmp_path.iterdir())

@@ -8,7 +8,6 @@ from functools import partial
 from itertools import islice
 import json
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from active_recon.batch.finding import bags_below
 from active_recon.batch.results import BagResult
@@ -23,7 +22,7 @@ from active_recon.cluster.stores import Place, Stored
 from active_recon.cluster.telling import told
 from active_recon.errors import DataError, WorkError
 from active_recon.reporting import Reporting, silent
-from active_recon.whole_files import whole_file
+from active_recon.whole_files import unfinished_folder, whole_file
 
 SUMMARY = 'summary.html'
 MOST_TOLD = 5
@@ -76,9 +75,8 @@ def _place_of_list(out: Place) -> Iterator[Path]:
     """
     if isinstance(out, Path):
         out.mkdir(parents=True, exist_ok=True)
-    with TemporaryDirectory(prefix='.', dir=out if isinstance(out, Path) else None,
-                            ignore_cleanup_errors=True) as folder:
-        yield Path(folder) / _LIST
+    with unfinished_folder(out if isinstance(out, Path) else None) as folder:
+        yield folder / _LIST
 
 
 def _run(task: Task, roots: Sequence[Place], crew: Crew, reporting: Reporting,

@@ -3,14 +3,13 @@
 from collections.abc import Sequence
 from pathlib import Path
 import re
-from tempfile import TemporaryDirectory
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
 from active_recon.errors import ConfigError
 from active_recon.meshes.collision import convex_parts
 from active_recon.meshes.files import write_mesh
-from active_recon.whole_files import whole_file
+from active_recon.whole_files import unfinished_folder, whole_file
 import numpy as np
 from numpy.typing import NDArray
 import trimesh
@@ -39,14 +38,14 @@ def write_urdf(mesh: trimesh.Trimesh, path: Path, density: float = DENSITY) -> s
     ElementTree.indent(robot)
     folder.mkdir(parents=True, exist_ok=True)
     # What stood there is left until all of the new is on the disk
-    with TemporaryDirectory(prefix='.', dir=folder) as unfinished, whole_file(path) as description:
+    with unfinished_folder(folder) as unfinished, whole_file(path) as description:
         description.write_text(
             f'<?xml version="1.0"?>\n{ElementTree.tostring(robot, "unicode")}\n')
         for part, each in zip((mesh, *parts), ('visual.obj', *names), strict=True):
-            write_mesh(part, Path(unfinished, each))
+            write_mesh(part, unfinished / each)
         for stale in folder.glob('collision_*.stl'):
             stale.unlink()
-        for file in Path(unfinished).iterdir():
+        for file in unfinished.iterdir():
             file.replace(folder / file.name)
     return missing
 

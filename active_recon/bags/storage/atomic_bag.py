@@ -3,13 +3,13 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 from active_recon.bags.storage.message_types import message_definition
 from active_recon.bags.storage.metadata import QosProfile
 from active_recon.bags.storage.writer import BagWriter
 from active_recon.errors import RecordingError
+from active_recon.whole_files import unfinished_folder
 from msg_tools.serialization import message_bytes, type_name
 
 
@@ -26,8 +26,8 @@ def atomic_bag(folder: Path) -> Iterator[BagWriter]:
                              'folder', 'bag_not_begun')
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
-        with TemporaryDirectory(prefix=f'.{folder.name}-', dir=folder.parent) as temporary:
-            with BagWriter(Path(temporary) / folder.name) as bag:
+        with unfinished_folder(folder.parent, f'.{folder.name}-') as unfinished:
+            with BagWriter(unfinished / folder.name) as bag:
                 yield bag
             bag.folder.rename(folder)
     except OSError as error:
