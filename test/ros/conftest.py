@@ -36,6 +36,8 @@ import trimesh
 
 from .processes import Forked, Started
 
+pytest.register_assert_rewrite('ros.hand_listed_loop')  # what differs is told
+
 LATCHED_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 STREAM_QOS = QoSProfile(depth=100)
 BUDGET_S = 60.0  # for what takes a second on an idle machine
@@ -139,7 +141,8 @@ class Bench:
         """Spin until the condition holds; return what it returned."""
         value = self.within(budget_s, condition)
         assert value, (f'waited {budget_s} s in vain for {what}; nodes: '
-                       f'{sorted(self.node.get_fully_qualified_node_names())}')
+                       f'{sorted(self.node.get_fully_qualified_node_names())}; told last: '
+                       f'{self._states}')
         return value
 
     def within(self, budget_s: float, condition: Callable[[], Any]) -> Any:
