@@ -236,10 +236,20 @@ class Camera:
             rays: NDArray[np.float64] = (
                 across[None, :, None] * rightward + down[:, None, None] * downward + forward)
             return rays
-        found = (_kept_undistorted if (right - left) * (bottom - top) <= _KEPT_PIXELS
-                 else _undistorted)
-        straight = found(lens, left, top, right, bottom)
+        straight = shown_at_depth_1(lens, (left, top, right, bottom))
         return np.asarray(straight[..., :1] * rightward + straight[..., 1:] * downward + forward)
+
+
+def shown_at_depth_1(lens: Intrinsics, window: tuple[int, int, int, int] | None = None
+                     ) -> NDArray[np.float64]:
+    """
+    Return x right and y down that the pixels show at depth 1, (height, width, 2).
+
+    It is the inverse of `Intrinsics.pixels_of`. `window` is as for `Camera.ray_directions`.
+    """
+    left, top, right, bottom = window or (0, 0, lens.width, lens.height)
+    is_kept = lens.distortion is not None and (right - left) * (bottom - top) <= _KEPT_PIXELS
+    return (_kept_at_depth_1 if is_kept else _at_depth_1)(lens, left, top, right, bottom)
 
 
 def _normalised(lens: Intrinsics, left: int, top: int, right: int, bottom: int
@@ -249,16 +259,16 @@ def _normalised(lens: Intrinsics, left: int, top: int, right: int, bottom: int
             np.asarray((np.arange(top, bottom) + 0.5 - lens.cy) / lens.fy, np.float64))
 
 
-def _undistorted(lens: Intrinsics, left: int, top: int, right: int,
-                 bottom: int) -> NDArray[np.float64]:
-    """Return x and y that a window shows at depth 1, (height, width, 2), without distortion."""
-    assert lens.distortion is not None
+def _at_depth_1(lens: Intrinsics, left: int, top: int, right: int,
+                bottom: int) -> NDArray[np.float64]:
     seen = np.stack(np.meshgrid(*_normalised(lens, left, top, right, bottom)), axis=-1)
+    if lens.distortion is None:
+        return seen
     return lens.distortion.undistort(seen.reshape(-1, 2)).reshape(seen.shape)
 
 
 # Photos, and the images of a camera, share a lens: its points take far longer than their rays
-_kept_undistorted = lru_cache(maxsize=4)(_undistorted)
+_kept_at_depth_1 = lru_cache(maxsize=4)(_at_depth_1)
 
 
 class OrbitCamera(Camera):

@@ -8,7 +8,7 @@ other camera. This is exact at every depth if both cameras have the same positio
 from collections.abc import Callable, Iterator
 import math
 
-from active_recon.geometry.cameras import Camera
+from active_recon.geometry.cameras import Camera, shown_at_depth_1
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -107,11 +107,13 @@ def carried_back(framed: NDArray[np.float32], target: Camera,
         return np.asarray(cv2.warpPerspective(framed, opencv_turn(camera, target),
                                               (lens.width, lens.height)))
     by = max(1.0, max(lens.width, lens.height) / _CARRIED_SIDE)
-    few = Camera(camera.pose, lens.resized(round(lens.width / by), round(lens.height / by)))
-    rays = few.ray_directions()
-    pixels, depth = target.project((camera.position + rays).reshape(-1, 3))
-    pixels[~(depth > 0)] = _NOWHERE
-    columns, rows = (each.reshape(rays.shape[:2]).astype(np.float32) - 0.5 for each in pixels.T)
+    few = lens.resized(round(lens.width / by), round(lens.height / by))
+    turned = cv2.transform(shown_at_depth_1(few), _turn(target, camera))  # (h, w, 3)
+    depth = turned[..., 2]
+    ahead = depth > 0
+    columns, rows = (
+        np.divide(turned[..., axis], depth, out=np.full(ahead.shape, _NOWHERE), where=ahead)
+        .astype(np.float32) - 0.5 for axis in (0, 1))
     found = cv2.remap(framed, columns, rows, cv2.INTER_LINEAR)
     return np.asarray(cv2.resize(found, (lens.width, lens.height)))
 
@@ -177,8 +179,12 @@ def _plane_to_camera(target: Camera, camera: Camera) -> NDArray[np.float64]:
 
 def turn_between(camera: Camera, target: Camera) -> NDArray[np.float64]:
     """Return the homography, (3, 3), from the target's pixels to those of a camera beside it."""
-    return np.asarray(camera.intrinsics.matrix @ camera.pose[:3, :3].T @ target.pose[:3, :3]
-                      @ np.linalg.inv(target.intrinsics.matrix))
+    return np.asarray(_turn(camera, target) @ np.linalg.inv(target.intrinsics.matrix))
+
+
+def _turn(camera: Camera, target: Camera) -> NDArray[np.float64]:
+    """Return the matrix (3, 3) from the target's rays to the pixels of a camera beside it."""
+    return np.asarray(camera.intrinsics.matrix @ camera.pose[:3, :3].T @ target.pose[:3, :3])
 
 
 def is_ahead(shown: Camera, camera: Camera) -> bool:
