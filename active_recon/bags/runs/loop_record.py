@@ -17,6 +17,7 @@ from active_recon.bags.storage.message_types import (
     read_message,
 )
 from active_recon.errors import ActiveReconError, DataError
+from active_recon.volumes.sparse_grid import SparseVoxelGrid
 from msg_tools.cameras import pose_from_msg
 from msg_tools.diagnostics import diagnostics_from_msg
 from msg_tools.entropy import entropy_from_msg
@@ -64,8 +65,8 @@ class LoopRecord:
         self._from_msg: dict[str, Callable[[Any], Any]] = {
             'episode': episode_from_msg,
             'view': lambda msg: pose_from_msg(msg, object_frame),
-            'occupancy': lambda msg: voxel_grid_from_msg(msg, object_size),
-            'probabilities': lambda msg: voxel_grid_from_msg(msg, object_size),
+            'occupancy': lambda msg: SparseVoxelGrid(voxel_grid_from_msg(msg, object_size)),
+            'probabilities': lambda msg: SparseVoxelGrid(voxel_grid_from_msg(msg, object_size)),
             'latent': latent_from_msg,
             'view_image': image_from_msg,
             'entropy': entropy_from_msg,
