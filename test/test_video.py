@@ -66,6 +66,36 @@ def test_a_video_whose_header_tells_another_number_of_frames_is_used(told, tmp_p
     assert 1 <= len(names(path, 3)) <= 3
 
 
+@pytest.fixture
+def noisy(tmp_path):
+    """Return a video of 12 images that fill kilobytes each."""
+    rng = np.random.default_rng(0)
+    return written(tmp_path / 'noisy.avi', [rng.integers(0, 255, (SIZE[1], SIZE[0], 3), np.uint8)
+                                            for _ in range(12)])
+
+
+def test_frames_after_a_damaged_one_are_used(noisy):
+    stored = bytearray(noisy.read_bytes())
+    frames = [found.start() for found in re.finditer(b'00dc', stored)]
+    stored[frames[5] + 8:frames[5] + 300] = bytes(292)
+    noisy.write_bytes(stored)
+    assert len(names(noisy, 12)) == 11
+
+
+def test_a_video_that_is_cut_off_is_told_of(noisy):
+    def warnings():
+        said = []
+        with frames_of(noisy, 12, warn=said.append):
+            return said
+
+    assert not warnings()
+    stored = noisy.read_bytes()
+    noisy.write_bytes(stored[:len(stored) // 2])
+    [said] = warnings()
+    assert re.fullmatch(r'noisy.avi: only [56] of 12 frames can be read: is the video whole\?',
+                        said)
+
+
 def test_frames_are_counted_where_the_header_does_not_tell(tmp_path, monkeypatch):
     path, opened = film(tmp_path / 'film.avi'), cv2.VideoCapture
     assert frame_count(path) == 8

@@ -16,6 +16,7 @@ FOLDER_RATE = 10.0
 _DEVICE = '/dev/video'
 _FILM_RATE = 30.0  # of a file that does not tell
 _HIGHEST_RATE = 1000.0
+_TRIES = 5  # to find another image of a file
 # The reason is said in one line here, not by the libraries
 os.environ.setdefault('OPENCV_FFMPEG_LOGLEVEL', '-8')
 _SILENT = 0
@@ -153,6 +154,11 @@ class _Film(_Captured):
         own = capture.get(cv2.CAP_PROP_FPS)
         super().__init__(path, capture)
         self.rate = rate or (own if 0 < own <= _HIGHEST_RATE else _FILM_RATE)
+
+    def _next(self) -> NDArray[np.uint8] | None:
+        """Return the next image that is whole: after damage OpenCV says once that none comes."""
+        tries = (super(_Film, self)._next() for _ in range(_TRIES))
+        return next((image for image in tries if image is not None), None)
 
 
 class _Folder:

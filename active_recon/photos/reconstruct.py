@@ -105,8 +105,10 @@ def from_files(place: Path | Sequence[Path], source: Source | None, options: Opt
     """
     if is_video(place):
         require_found(source, options.masks)
-        with frames_of(place, options.frames, reporting) as folder:
-            return from_files(folder, source, options, reporting)
+        warnings: list[str] = []
+        with frames_of(place, options.frames, reporting, warnings.append) as folder:
+            shape = from_files(folder, source, options, reporting)
+        return replace(shape, warnings=[*warnings, *shape.warnings])
     is_scaled = not isinstance(source, SfmCameras) or options.size is not None
     if isinstance(source, SfmCameras):
         _require_no_lengths(options)
