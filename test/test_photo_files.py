@@ -1,6 +1,8 @@
 """Photos are read upright, in 8 bits, and no larger than needed; what is no photo is left out."""
 
 import shutil
+import subprocess
+import sys
 
 from active_recon.errors import ConfigError, DataError
 from active_recon.geometry.cameras import Camera, Intrinsics, orbit_camera
@@ -223,19 +225,37 @@ def test_a_folder_whose_folders_have_the_photos_names_them(tmp_path):
         photo_paths(tmp_path)
 
 
-def test_hidden_files_and_depth_are_no_photos_and_heic_is_told_of(tmp_path):
+def test_a_folder_whose_files_are_no_photos_names_one(tmp_path):
+    for name in ('.DS_Store', 'IMG_10.MOV', 'IMG_2.MOV'):
+        (tmp_path / name).touch()
+    with pytest.raises(DataError, match='found none among 2 files such as IMG_2.MOV$'):
+        photo_paths(tmp_path)
+
+
+def test_hidden_files_and_depth_are_no_photos_and_raw_ones_are_told_of(tmp_path):
     Image.fromarray(drawn()).save(tmp_path / 'a.png')
-    for name in ('.trashed-1-a.png', '._a.png', '~a.png', 'a_depth.png', 'b.HEIC'):
+    for name in ('.trashed-1-a.png', '._a.png', '~a.png', 'a_depth.png', 'a.DNG', 'b.DNG'):
         shutil.copy(tmp_path / 'a.png', tmp_path / name)
     photos, left_out = open_photos(photo_paths(tmp_path))
     assert [photo.name for photo in photos] == ['a.png']
-    assert len(left_out) == 1 and left_out[0].startswith('b.HEIC: HEIC photos cannot be read: let')
+    assert len(left_out) == 1 and left_out[0].startswith('b.DNG: not readable: ')
+    assert 'a raw photo: convert it to JPEG' in left_out[0]
     arrivals = Arrivals(tmp_path)
     arrivals.arrived(0.0)
-    assert {path.name for path in arrivals.arrived(1.0)} == {'a.png', 'b.HEIC'}
+    assert {path.name for path in arrivals.arrived(1.0)} == {'a.png', 'b.DNG'}
     (tmp_path / 'a.png').unlink()
-    with pytest.raises(DataError, match=r'no readable photo: .*; b.HEIC: HEIC photos cannot be'):
+    with pytest.raises(DataError, match=r'no readable photo: .*; b.DNG: not readable: .* raw'):
         open_photos(photo_paths(tmp_path))
+
+
+def test_of_a_damaged_photo_nothing_is_said_but_why_it_is_left_out(tmp_path):
+    (tmp_path / 'a.tif').write_bytes(b'II*\0' + np.random.default_rng(0).bytes(500))
+    code = ('from pathlib import Path\nfrom active_recon.photos.files import open_photo\n'
+            f'try: open_photo(Path({str(tmp_path / "a.tif")!r}), {{}})\n'
+            'except Exception as error: print(error)')
+    done = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, check=True)
+    assert done.stdout.startswith('a.tif: not readable') and done.stdout.count('\n') == 1
+    assert not done.stderr
 
 
 def test_a_truncated_photo_is_left_out_by_its_name(tmp_path):

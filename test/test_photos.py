@@ -397,9 +397,9 @@ def test_what_is_wrong_with_photos_is_one_line_each_and_the_others_are_used(plai
 def test_an_error_names_the_photos_that_were_left_out_before_it(plain, tmp_path):
     shutil.copytree(plain, tmp_path / 'some')
     for path in sorted((tmp_path / 'some').glob('*.png'))[1:]:
-        path.rename(path.with_suffix('.heic'))
+        path.rename(path.with_suffix('.dng'))
     with pytest.raises(DataError, match=rf'got 1 that look the same way; .*\. Left out before, '
-                                        rf'{COUNT - 1}: photo1.heic: HEIC photos cannot be read'):
+                                        rf'{COUNT - 1}: photo1.dng: not readable'):
         active_recon.reconstruct(tmp_path / 'some')
 
 

@@ -145,7 +145,8 @@ def test_the_answer_says_what_became_of_the_photo_and_where_to_stand(server, ver
 @pytest.mark.parametrize(('photo', 'words'), [
     (b'<html>no photo</html>', 'expected JPEG or PNG'), (b'', 'expected JPEG or PNG'),
     (b'\xff\xd8\xff\xe0 no more', 'expected JPEG or PNG'),
-    (b'\0\0\0\x18ftypheic' + bytes(40), 'HEIC photos cannot be read')])
+    (b'\0\0\0\x18ftypheic' + bytes(40), 'HEIC photos cannot be read'),
+    (b'\0\0\0\x18ftypmp42' + bytes(40), 'expected JPEG or PNG')])
 def test_what_is_no_photo_is_refused_by_its_content(server, folder, photo, words):
     status, told = send(server, photo, headers={'Content-Type': 'image/jpeg'}.items())
     assert status == 415 and words in told['verdict'] and '\n' not in told['verdict']

@@ -30,11 +30,18 @@ def image_paths(places: list[Path]) -> list[Path]:
                                        and not path.name.startswith('.'))]
     if not paths:
         raise DataError(f'{", ".join(map(str, places))}: no images: expected some '
-                        f'({", ".join(SUFFIXES)}), found none')
+                        f'({", ".join(SUFFIXES)}), found {found_instead(*places)}')
     names = [path.name for path in paths]
     if twice := sorted({name for name in names if names.count(name) > 1}):
         raise DataError(f'images of the same name: expected different names, got {twice[0]} twice')
     return sorted(paths, key=in_order)
+
+
+def found_instead(*folders: Path) -> str:
+    """Return in words what folders without images have: none, or how many files, such as one."""
+    others = sorted((path for folder in folders for path in folder.iterdir()
+                     if path.is_file() and not path.name.startswith('.')), key=in_order)
+    return f'none among {len(others)} files such as {others[0].name}' if others else 'none'
 
 
 def in_order(path: Path) -> list[tuple[int, str]]:

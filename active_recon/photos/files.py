@@ -8,19 +8,15 @@ import hashlib
 import math
 from pathlib import Path
 
-from active_recon.calibration.files import in_order, SUFFIXES
+from active_recon.calibration.files import found_instead, in_order
 from active_recon.errors import ConfigError, DataError
 from active_recon.photos.depth_files import is_depth
+from active_recon.photos.formats import ENDINGS, HEIC_ENDINGS, RAW_ENDINGS, turned_already
 from active_recon.photos.large_images import opened
 import numpy as np
 from numpy.typing import NDArray
 from PIL import ExifTags, Image
 
-ENDINGS = (*SUFFIXES, '.webp')
-HEIC_ENDINGS = ('.heic', '.heif')
-HEIC_ADVICE = ('HEIC photos cannot be read: let the camera take JPEG (on an iPhone: Settings, '
-               'Camera, Formats, Most Compatible)')
-"""What to do about the format that phones may use."""
 ORDERS = ('name', 'time')
 """By their names, 2 before 10, or by when they were taken."""
 LARGEST_SIDE = 2048
@@ -31,6 +27,7 @@ _TURNED = {2: Image.Transpose.FLIP_LEFT_RIGHT, 3: Image.Transpose.ROTATE_180,
            4: Image.Transpose.FLIP_TOP_BOTTOM, 5: Image.Transpose.TRANSPOSE,
            6: Image.Transpose.ROTATE_270, 7: Image.Transpose.TRANSVERSE,
            8: Image.Transpose.ROTATE_90}
+_TURNED_BACK = {**_TURNED, 6: Image.Transpose.ROTATE_90, 8: Image.Transpose.ROTATE_270}
 _WITH_MEANS = {'L', 'RGB', 'RGBA', 'CMYK'}
 
 
@@ -69,28 +66,37 @@ def is_photo(path: Path) -> bool:
 
     Hidden files (what a phone has in its bin, what is not whole yet), depth images and folders
     are none.
-    HEIC, which cannot be read, is one: it has to be told of.
+    Raw photos, which cannot be read, are some: they have to be told of.
     """
-    return (path.suffix.lower() in (*ENDINGS, *HEIC_ENDINGS)
+    return (path.suffix.lower() in (*ENDINGS, *RAW_ENDINGS)
             and not path.name.startswith(('.', '~')) and not is_depth(path)
             and not path.is_dir())
+
+
+def photos_in(folder: Path) -> list[Path]:
+    """Return what `is_photo` in a folder, but no raw photo beside another one of its name."""
+    paths = list(filter(is_photo, folder.iterdir()))
+    raw = {path for path in paths if path.suffix.lower() in RAW_ENDINGS}
+    developed = {path.stem for path in paths if path not in raw}
+    return [path for path in paths if path not in raw or path.stem not in developed]
 
 
 def photo_paths(place: Path | Sequence[Path]) -> list[Path]:
     """
     Return the photos of a folder in the order of their names, 2 before 10; a list stays as it is.
 
-    They are those of `is_photo`. Raises DataError where the folder is missing or has none.
+    They are those of `photos_in`. Raises DataError where the folder is missing or has none.
     """
     if not isinstance(place, Path):
         return list(place)
     if not place.is_dir():
         raise DataError(f'{place}: no such folder: expected one with photos '
                         f'({", ".join(ENDINGS)})', 'no_photos')
-    paths = sorted(filter(is_photo, place.iterdir()), key=in_order)
+    paths = sorted(photos_in(place), key=in_order)
     if not paths:
         within = ', '.join(_folders_with_photos(place))
-        raise DataError(f'{place}: no photos: expected files of {", ".join(ENDINGS)}, found none'
+        raise DataError(f'{place}: no photos: expected files of {", ".join(ENDINGS)}, found '
+                        f'{found_instead(place)}'
                         f'{within and f"; give one of its folders that have some: {within}"}',
                         'no_photos')
     return paths
@@ -111,17 +117,22 @@ def open_photos(paths: Iterable[Path]) -> tuple[list[PhotoFile], list[str]]:
     """
     Return the photos among files, and why the others are left out.
 
-    A photo whose file has the same bytes as one before is left out. One that cannot be read is
-    `lost` after the one before it, unless another file has its name but for the ending. Raises
-    DataError where none is left.
+    A photo whose file has the same bytes as one before is left out, and HEIC that another file has
+    the name of but for the ending: one was made from the other. One that cannot be read is `lost`
+    after the one before it, unless another file has its name. Raises DataError where none is left.
     """
     paths = list(paths)
     named = Counter(path.with_suffix('') for path in paths)
+    converted = {path.with_suffix(''): path for path in paths
+                 if path.suffix.lower() not in HEIC_ENDINGS}
     photos: list[PhotoFile] = []
     left_out: list[str] = []
     known: dict[bytes, Path] = {}
     for path in paths:
+        twin = converted.get(path.with_suffix(''), path)
         try:
+            if twin != path and path.suffix.lower() in HEIC_ENDINGS:
+                raise DataError(f'{path.name}: the same photo as {twin.name}')
             photos.append(open_photo(path, known))
         except DataError as error:
             left_out.append(str(error))
@@ -139,8 +150,6 @@ def open_photo(path: Path, known: dict[bytes, Path]) -> PhotoFile:
 
     Raises DataError where it cannot be read, or one of `known` has the same bytes.
     """
-    if path.suffix.lower() in HEIC_ENDINGS:
-        raise DataError(f'{path.name}: {HEIC_ADVICE}', _UNREADABLE)
     try:
         stored = path.read_bytes()
         if not stored:
@@ -186,6 +195,7 @@ def read_photo(photo: PhotoFile, upright: bool = True) -> NDArray[np.uint8]:
     """
     try:
         with opened(photo.path) as image:
+            already = turned_already(image)
             if max(image.size) > LARGEST_SIDE:
                 # A JPEG is then decoded at an eighth to a half of its size
                 image.draft('RGB', (LARGEST_SIDE, LARGEST_SIDE))
@@ -194,16 +204,19 @@ def read_photo(photo: PhotoFile, upright: bool = True) -> NDArray[np.uint8]:
     except DataError as error:
         raise DataError(f'{photo.name}: not readable: expected a whole image, got: '
                         f'{error}') from error
-    if upright and photo.orientation in _TURNED:
-        pixels = pixels.transpose(_TURNED[photo.orientation])
+    turns = {} if upright == (already != 1) else _TURNED if upright else _TURNED_BACK
+    if photo.orientation in turns:
+        pixels = pixels.transpose(turns[photo.orientation])
     return np.asarray(pixels, np.uint8)
 
 
 def _opened(path: Path) -> PhotoFile:
     with opened(path) as image:
         exif = Image.Image.getexif(image)  # that of PNG would decode the whole image
-        turned = exif.get(ExifTags.Base.Orientation, 1)
-        return PhotoFile(path, image.size, turned if turned in _TURNED else 1,
+        already = turned_already(image)
+        turned = already if already != 1 else exif.get(ExifTags.Base.Orientation, 1)
+        size = image.size[::-1] if already >= 5 else image.size
+        return PhotoFile(path, size, turned if turned in _TURNED else 1,
                          _focal(exif, image.size), _taken(exif))
 
 

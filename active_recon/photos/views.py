@@ -11,7 +11,8 @@ from active_recon.file_names import comparable
 from active_recon.geometry.cameras import Camera, Intrinsics
 from active_recon.photos.camera_file import PosedPhoto
 from active_recon.photos.depth_files import depth_files, read_depth
-from active_recon.photos.files import ENDINGS, read_photo
+from active_recon.photos.files import read_photo
+from active_recon.photos.formats import ENDINGS
 from active_recon.photos.large_images import opened
 import cv2
 import numpy as np

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from active_recon.calibration.files import in_order
 from active_recon.errors import DataError
-from active_recon.photos.files import is_photo
+from active_recon.photos.files import photos_in
 
 SETTLED_S = 0.8
 """A file is whole once it has not changed for so long, seconds."""
@@ -26,7 +26,7 @@ class Arrivals:
     """
     Tells which photos of a folder have come, changed or gone.
 
-    Photos are those of `is_photo`: what programs that synchronise folders have not whole yet they
+    Photos are those of `photos_in`: what programs that synchronise folders have not whole yet they
     keep as hidden files, or under other endings. While the folder cannot be read nothing comes or
     goes, and `away` says why; else it is ''. Raises DataError where there is no such folder.
     """
@@ -69,7 +69,7 @@ class Arrivals:
         """Return the size of each photo and the time of its last change; none while `away`."""
         found = {}
         try:
-            paths = list(filter(is_photo, self._folder.iterdir()))
+            paths = photos_in(self._folder)
             self.away = ''
         except OSError as error:
             paths = []

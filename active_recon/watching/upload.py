@@ -21,7 +21,7 @@ import threading
 from typing import Any
 
 from active_recon.errors import ConfigError, DataError
-from active_recon.photos.files import HEIC_ADVICE
+from active_recon.photos.formats import is_heic, JPEG_ADVICE
 from active_recon.photos.large_images import opened
 from active_recon.viewer.address import HOST
 from active_recon.watching.upload_page import PAGE
@@ -41,7 +41,6 @@ _ANSWER_S = 60.0
 _LOOK_S = 0.1  # how often it is looked whether to stop
 _IDLE_S = 30.0  # after which a client that sends nothing is left
 _CHUNK = 1 << 16
-_HEIC = b'ftyp'  # in bytes 4 to 8, also of AVIF and films
 
 
 class UploadServer(ThreadingHTTPServer):
@@ -134,8 +133,8 @@ def lan_address() -> str:
 
 def refusal(photo: bytes) -> str:
     """Return why bytes are no photo that can be used, in one line; '' where they are one."""
-    if photo[4:8] == _HEIC:
-        return HEIC_ADVICE
+    if is_heic(photo[:64]):
+        return f'HEIC photos cannot be read here: {JPEG_ADVICE}'
     return '' if _format(photo) else ('not a photo: expected JPEG or PNG, whole and of at most '
                                       f'{_MOST_PIXELS / 1e6:.0f} megapixels')
 
