@@ -11,7 +11,7 @@ from PIL import Image
 HEIC_ENDINGS = ('.heic', '.heif', '.hif')
 ENDINGS = (*SUFFIXES, '.webp', '.avif', *HEIC_ENDINGS)
 RAW_ENDINGS = ('.3fr', '.arw', '.cr2', '.cr3', '.crw', '.dng', '.nef', '.nrw', '.orf', '.pef',
-               '.raf', '.raw', '.rw2', '.srw', '.x3f')
+               '.raf', '.rw2', '.srw', '.x3f')
 JPEG_ADVICE = ('let the camera take JPEG (on an iPhone: Settings, Camera, Formats, Most '
                'Compatible)')
 """What to do about the format that phones may use."""
@@ -51,5 +51,5 @@ def require_reader(source: Path | BinaryIO) -> None:
 
 def turned_already(image: Image.Image) -> int:
     """Return the EXIF orientation by which an opened image is turned: HEIC's, else 1."""
-    turned = image.info.get('original_orientation') if image.format == 'HEIF' else None
-    return int(turned) if turned in range(2, 9) else 1
+    turned = int(image.info.get('original_orientation') or 1) if image.format == 'HEIF' else 1
+    return turned if 2 <= turned <= 8 else 1
