@@ -1,6 +1,7 @@
 """Photos that find their cameras by a board, and those of a turntable."""
 
 import math
+import os
 
 from active_recon.calibration.board import Board
 from active_recon.calibration.lens import write_lens
@@ -86,6 +87,21 @@ def test_photos_of_another_size_are_left_out_as_of_another_lens(photos, tmp_path
                         '960 x 720']
 
 
+def test_photos_that_were_zoomed_are_left_out_as_of_another_lens(photos, tmp_path):
+    for number, photo in enumerate(photos[:5]):
+        exif = Image.Exif()
+        exif[ExifTags.Base.Orientation] = 1
+        if number:
+            exif.get_ifd(ExifTags.IFD.Exif)[ExifTags.Base.FocalLengthIn35mmFilm] = (
+                (39, 40, 52, 39)[number - 1])  # rounded differently, and zoomed
+        with Image.open(photo.path) as image:
+            image.save(tmp_path / photo.name, exif=exif)
+    _, posed, left_out = posed_by(BoardCameras(BOARD), open_photos(photo_paths(tmp_path))[0])
+    assert [each.photo.name for each in posed] == ['0.png', '1.png', '2.png', '4.png']
+    assert left_out == ['3.png: another zoom: expected a focal length of 39 mm (35 mm '
+                        'equivalent), as others have by EXIF, got 52']
+
+
 def test_a_lens_from_a_file_needs_a_single_photo_and_fits_a_reduced_one(photos, tmp_path):
     write_lens(LENS.resized(4 * LENS.width, 4 * LENS.height), tmp_path / 'lens.yaml')
     with Image.open(photos[0].path) as image:
@@ -132,6 +148,15 @@ def test_a_folder_that_is_called_as_a_photo_is_none(tmp_path):
     assert not is_photo(tmp_path / 'masks.png')
     photos, left_out = open_photos(photo_paths(tmp_path))
     assert [photo.name for photo in photos] == ['photo0.png', 'photo1.png'] and not left_out
+
+
+def test_a_pipe_that_is_called_as_a_photo_is_none_and_a_link_to_nothing_is_told_of(tmp_path):
+    blank_photos(tmp_path, rig(PINHOLE, count=2))
+    os.mkfifo(tmp_path / 'pipe.png')
+    (tmp_path / 'link.png').symlink_to('moved.png')
+    photos, left_out = open_photos(photo_paths(tmp_path))
+    assert len(photos) == 2
+    assert len(left_out) == 1 and left_out[0].startswith('link.png: not readable')
 
 
 def test_by_time_the_place_of_a_photo_that_cannot_be_read_is_unknown(tmp_path):

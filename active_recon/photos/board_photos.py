@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 FEWEST = 3
 """Photos from which the lens is estimated where nothing else is known of it."""
+_SAME_FOCAL = 1.03  # ratio: EXIF often has whole millimetres
 _LARGEST_ERROR = 0.004  # of the photo's longer side, RMS: beyond, it is a wrong pose
 SeenPhoto = tuple[PhotoFile, Detection]
 """A photo, and the board's corners in it."""
@@ -57,12 +58,15 @@ def posed_on_board(seen: Sequence[SeenPhoto], board: Board, lens_file: Path | No
 
     The world has z up and its origin at the board's first corner; metres. All photos are of one
     lens: that of `lens_file`, in ROS's YAML format, or estimated from the photos of the most
-    frequent size. EXIF's focal length is where the estimate begins, and is the lens where fewer
-    than three photos show the board. Raises DataError where no lens or no pose can be found;
-    `of_photos` is the number of photos that were searched.
+    frequent size. One whose focal length by EXIF is not that of most is left out: it was zoomed.
+    EXIF's focal length is where the estimate begins, and is the lens where fewer than three photos
+    show the board. Raises DataError where no lens or no pose can be found; `of_photos` is the
+    number of photos that were searched.
     """
-    lens = _lens(seen, board, lens_file, of_photos or len(seen))
-    posed, left_out = [], []
+    of_photos = of_photos or len(seen)
+    seen, left_out = _of_one_zoom(seen)
+    lens = _lens(seen, board, lens_file, of_photos)
+    posed = []
     for photo, found in seen:
         own = lens.resized(*found.size) if photo.size == (lens.width, lens.height) else lens
         try:
@@ -76,6 +80,24 @@ def posed_on_board(seen: Sequence[SeenPhoto], board: Board, lens_file: Path | No
         raise DataError(f'no photo fits its board: {"; ".join(left_out[:3])}', 'too_few_images')
     file = CameraFile('board', (), np.array([0.0, 0.0, 1.0]), metric=True, board=board)
     return file, posed, left_out
+
+
+def _of_one_zoom(seen: Sequence[SeenPhoto]) -> tuple[list[SeenPhoto], list[str]]:
+    """Return the photos but for those of an unusual focal length by EXIF, and why they are not."""
+    def is_near(one: float, other: float) -> bool:
+        return 1 / _SAME_FOCAL < one / other < _SAME_FOCAL
+
+    told = [photo.film_focal for photo, _ in seen if photo.film_focal is not None]
+    usual = max(told, key=lambda one: sum(is_near(one, other) for other in told), default=0.0)
+    kept, left_out = [], []
+    for photo, found in seen:
+        focal = photo.film_focal
+        if focal is None or is_near(focal, usual):
+            kept.append((photo, found))
+        else:
+            left_out.append(f'{photo.name}: another zoom: expected a focal length of {usual:.0f} '
+                            f'mm (35 mm equivalent), as others have by EXIF, got {focal:.0f}')
+    return kept, left_out
 
 
 def _lens(seen: Sequence[SeenPhoto], board: Board, lens_file: Path | None,

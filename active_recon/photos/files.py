@@ -59,18 +59,22 @@ class PhotoFile:
         """Width and height once turned as EXIF says, pixels."""
         return self.size[::-1] if self.orientation >= 5 else self.size
 
+    @property
+    def film_focal(self) -> float | None:
+        """Focal length by EXIF with the same diagonal of view on film, millimetres."""
+        return None if self.focal is None else self.focal / math.hypot(*self.size) * _FILM_DIAGONAL
+
 
 def is_photo(path: Path) -> bool:
     """
     Return whether what a folder has is a photo, by its name.
 
-    Hidden files (what a phone has in its bin, what is not whole yet), depth images and folders
-    are none.
-    Raw photos, which cannot be read, are some: they have to be told of.
+    Hidden files (what a phone has in its bin, what is not whole yet), depth images, folders and
+    pipes are none. Raw photos, which cannot be read, are some: they have to be told of.
     """
     return (path.suffix.lower() in (*ENDINGS, *RAW_ENDINGS)
             and not path.name.startswith(('.', '~')) and not is_depth(path)
-            and not path.is_dir())
+            and (path.is_file() or not path.exists()))  # a link to nothing is told of
 
 
 def photos_in(folder: Path) -> list[Path]:
