@@ -88,6 +88,9 @@ def test_without_pillow_heif_the_refusal_tells_what_to_do(tmp_path, monkeypatch)
         with pytest.raises(DataError, match=rf"{name}: .* HEIC, .* 'active_recon\[heic\]', or let "
                                             'the camera take JPEG'):
             open_photos([tmp_path / name])
+    with pytest.raises(DataError) as raised:
+        open_photos(photo_paths(tmp_path))
+    assert 'a.HEIC' in str(raised.value) and str(raised.value).count('pip install') == 1
 
 
 @pytest.mark.parametrize(('brands', 'expected'), [

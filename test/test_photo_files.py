@@ -210,6 +210,9 @@ def test_a_folder_without_a_photo_is_refused(tmp_path):
         photo_paths(tmp_path)
     with pytest.raises(DataError, match='no such folder'):
         photo_paths(tmp_path / 'none')
+    (tmp_path / 'photo.txt').touch()
+    with pytest.raises(DataError, match='photo.txt: a file: expected a folder with photos'):
+        photo_paths(tmp_path / 'photo.txt')
     (tmp_path / 'broken.png').write_bytes(b'\x89PNG')
     with pytest.raises(DataError, match='no readable photo: expected at least one, got none; '
                                         'broken.png'):
@@ -228,7 +231,7 @@ def test_a_folder_whose_folders_have_the_photos_names_them(tmp_path):
 def test_a_folder_whose_files_are_no_photos_names_one(tmp_path):
     for name in ('.DS_Store', 'IMG_10.MOV', 'IMG_2.MOV'):
         (tmp_path / name).touch()
-    with pytest.raises(DataError, match='found none among 2 files such as IMG_2.MOV$'):
+    with pytest.raises(DataError, match='found none, but 2 others, such as IMG_2.MOV$'):
         photo_paths(tmp_path)
 
 
@@ -243,7 +246,8 @@ def test_hidden_files_and_depth_are_no_photos_and_raw_ones_are_told_of(tmp_path)
     arrivals = Arrivals(tmp_path)
     arrivals.arrived(0.0)
     assert {path.name for path in arrivals.arrived(1.0)} == {'a.png', 'b.DNG'}
-    (tmp_path / 'a.png').unlink()
+    for name in ('a.png', 'a.DNG'):
+        (tmp_path / name).unlink()
     with pytest.raises(DataError, match=r'no readable photo: .*; b.DNG: not readable: .* raw'):
         open_photos(photo_paths(tmp_path))
 

@@ -38,10 +38,11 @@ def image_paths(places: list[Path]) -> list[Path]:
 
 
 def found_instead(*folders: Path) -> str:
-    """Return in words what folders without images have: none, or how many files, such as one."""
+    """Return in words what folders without images have."""
     others = sorted((path for folder in folders for path in folder.iterdir()
                      if path.is_file() and not path.name.startswith('.')), key=in_order)
-    return f'none among {len(others)} files such as {others[0].name}' if others else 'none'
+    many = f'{len(others)} others, such as ' if len(others) > 1 else ''
+    return f'none, but {many}{others[0].name}' if others else 'none'
 
 
 def in_order(path: Path) -> list[tuple[int, str]]:
@@ -55,7 +56,8 @@ def read_image(path: Path) -> NDArray[np.uint8]:
     # Without rotation by EXIF: a camera's driver publishes images without it
     image = cv2.imread(str(path), cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
     if image is None:
-        raise DataError(f'{path}: not readable: expected an image file in a format of OpenCV')
+        raise DataError(f'{path}: not readable: expected an image file in a format of OpenCV; '
+                        'convert others, such as HEIC, to PNG or JPEG')
     return np.asarray(image, np.uint8)
 
 

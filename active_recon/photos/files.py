@@ -94,7 +94,8 @@ def photo_paths(place: Path | Sequence[Path]) -> list[Path]:
     if not isinstance(place, Path):
         return list(place)
     if not place.is_dir():
-        raise DataError(f'{place}: no such folder: expected one with photos '
+        wrong = 'a file' if place.exists() else 'no such folder'
+        raise DataError(f'{place}: {wrong}: expected a folder with photos '
                         f'({", ".join(ENDINGS)})', 'no_photos')
     paths = sorted(photos_in(place), key=in_order)
     if not paths:
@@ -143,8 +144,11 @@ def open_photos(paths: Iterable[Path]) -> tuple[list[PhotoFile], list[str]]:
             if photos and error.kind == _UNREADABLE and named[path.with_suffix('')] == 1:
                 photos[-1] = replace(photos[-1], lost=photos[-1].lost + 1)
     if not photos:
+        # Of many for the same reason the first
+        different = {reason.partition(': ')[2]: reason for reason in reversed(left_out)}
         raise DataError('no readable photo: expected at least one, got none'
-                        + ''.join(f'; {reason}' for reason in left_out[:3]), 'no_photos')
+                        + ''.join(f'; {reason}' for reason in [*different.values()][:-4:-1]),
+                        'no_photos')
     return photos, left_out
 
 
