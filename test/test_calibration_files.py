@@ -111,3 +111,15 @@ def test_digits_that_are_no_number_are_letters(tmp_path):
     for name in ('1²1.png', '2.png'):
         cv2.imwrite(str(tmp_path / name), np.zeros((2, 2, 3), np.uint8))
     assert len(image_paths([tmp_path])) == 2
+
+
+@pytest.mark.parametrize(('ending', 'share'), [('jpg', 0.0), ('jpg', 0.5), ('png', 0.5)])
+def test_an_image_that_is_cut_off_is_refused_not_filled_with_grey(ending, share, tmp_path):
+    path = tmp_path / f'cut.{ending}'
+    noise = np.random.default_rng(0).integers(0, 256, (60, 80, 3), np.uint8)
+    cv2.imwrite(str(path), noise)
+    assert read_image(path).shape == noise.shape
+    whole = path.read_bytes()
+    path.write_bytes(whole[:int(share * len(whole))])
+    with pytest.raises(DataError, match='cut.*: not readable: expected an image file, whole'):
+        read_image(path)

@@ -1,8 +1,10 @@
 """Input files of a calibration: images, and tables of their angles or poses."""
 
+from contextlib import suppress
 import csv
 from pathlib import Path
 import re
+from typing import Any
 
 from active_recon.errors import DataError
 from active_recon.file_names import comparable
@@ -54,11 +56,19 @@ def in_order(path: Path) -> list[tuple[int, str]]:
 def read_image(path: Path) -> NDArray[np.uint8]:
     """Return an image, (H, W, 3) uint8 BGR; raises DataError where it cannot be read."""
     # Without rotation by EXIF: a camera's driver publishes images without it
-    image = cv2.imread(str(path), cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
+    image = decoded(path, cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
     if image is None:
-        raise DataError(f'{path}: not readable: expected an image file in a format of OpenCV; '
-                        'convert others, such as HEIC, to PNG or JPEG')
+        raise DataError(f'{path}: not readable: expected an image file, whole, in a format of '
+                        'OpenCV; convert others, such as HEIC, to PNG or JPEG')
     return np.asarray(image, np.uint8)
+
+
+def decoded(path: Path, how: int) -> NDArray[Any] | None:
+    """Return an image as imread does, None where it cannot be read or is not whole."""
+    with suppress(OSError, cv2.error):  # OpenCV refuses 0 bytes so
+        # Of a file, imread takes what is missing of a JPEG for grey
+        return cv2.imdecode(np.frombuffer(path.read_bytes(), np.uint8), how)
+    return None
 
 
 def read_angles(path: Path, names: list[str]) -> dict[str, float]:

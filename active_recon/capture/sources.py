@@ -4,7 +4,7 @@ import os
 from pathlib import Path
 from typing import Any, Protocol
 
-from active_recon.calibration.files import image_paths, read_image
+from active_recon.calibration.files import decoded, image_paths, read_image
 from active_recon.errors import ConfigError, DataError
 from active_recon.geometry.cameras import Intrinsics
 import cv2
@@ -186,7 +186,7 @@ class _Folder:
 
 def _on_white(path: Path) -> NDArray[np.uint8]:
     """Return a file's image laid on white where it is transparent, as those of messages are."""
-    stored: Any = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+    stored: Any = decoded(path, cv2.IMREAD_UNCHANGED)
     channels = stored.shape[2] if stored is not None and stored.ndim == 3 else 1
     if channels == 3 and stored.dtype == np.uint8:
         return np.asarray(stored)
