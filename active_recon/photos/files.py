@@ -10,6 +10,7 @@ from pathlib import Path
 
 from active_recon.calibration.files import found_instead, in_order
 from active_recon.errors import ConfigError, DataError
+from active_recon.photos.color_profiles import in_srgb
 from active_recon.photos.depth_files import is_depth
 from active_recon.photos.formats import ENDINGS, HEIC_ENDINGS, RAW_ENDINGS, turned_already
 from active_recon.photos.large_images import opened
@@ -29,6 +30,7 @@ _TURNED = {2: Image.Transpose.FLIP_LEFT_RIGHT, 3: Image.Transpose.ROTATE_180,
            8: Image.Transpose.ROTATE_90}
 _TURNED_BACK = {**_TURNED, 6: Image.Transpose.ROTATE_90, 8: Image.Transpose.ROTATE_270}
 _WITH_MEANS = {'L', 'RGB', 'RGBA', 'CMYK'}
+_MODES_OF_PROFILES = {'RGB', 'RGBA'}  # of CMYK the colours are made without its profile
 
 
 @dataclass(frozen=True)
@@ -198,8 +200,8 @@ def read_photo(photo: PhotoFile, upright: bool = True) -> NDArray[np.uint8]:
     Return a photo's pixels, (H, W, 3) uint8 RGB, or (H, W, 4) with straight alpha.
 
     It is turned as EXIF says, or as stored without `upright`; larger ones are reduced to
-    `LARGEST_SIDE` or less; 16 bits a channel become 8. Raises DataError where the file is damaged
-    or has a format without a meaning in colours.
+    `LARGEST_SIDE` or less; 16 bits a channel become 8, colours of another space sRGB. Raises
+    DataError where the file is damaged or has a format without a meaning in colours.
     """
     try:
         with opened(photo.path) as image:
@@ -209,6 +211,8 @@ def read_photo(photo: PhotoFile, upright: bool = True) -> NDArray[np.uint8]:
                 image.draft('RGB', (LARGEST_SIDE, LARGEST_SIDE))
             image.load()
             pixels = _reduced(_eight_bits(_reduced(image)))
+            if image.mode in _MODES_OF_PROFILES:
+                pixels = in_srgb(pixels, image.info.get('icc_profile'))
     except DataError as error:
         raise DataError(f'{photo.name}: not readable: expected a whole image, got: '
                         f'{error}') from error
