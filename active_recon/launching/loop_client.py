@@ -75,8 +75,10 @@ class LoopClient:
 def joined_domain(name: str) -> Iterator[tuple[Node, SingleThreadedExecutor]]:
     """Join the ROS domain of the environment with a node and its executor."""
     context = Context()
-    # Ctrl-C raises KeyboardInterrupt here, so that the caller can clean up
-    rclpy.init(args=[], context=context, signal_handler_options=SignalHandlerOptions.NO)
+    # No log file, for which a user without a home, as in a container, has no folder. Ctrl-C raises
+    # KeyboardInterrupt here, so that the caller can clean up
+    rclpy.init(args=['--ros-args', '--disable-external-lib-logs'], context=context,
+               signal_handler_options=SignalHandlerOptions.NO)
     node = Node(name, context=context)
     executor = SingleThreadedExecutor(context=context)
     executor.add_node(node)

@@ -1,5 +1,6 @@
 """A node that cannot start says why in one line, with what was expected, and ends."""
 
+import os
 import re
 import subprocess
 import sys
@@ -51,6 +52,22 @@ def refused_arguments(module, given):
 ])
 def test_a_parameter_out_of_range_is_refused_with_its_range(start_node, name, parameters, said):
     assert re.search(f'parameters? {said}', refusal(start_node, name, **parameters))
+
+
+@pytest.mark.parametrize(('folders', 'said'), [
+    ({}, 'no folder: expected HOME or ROS_LOG_DIR to name one, got neither'),
+    ({'HOME': '/dev/null'}, '/dev/null/.ros/log: cannot be written: expected a folder that files '
+                            'can be made in, got: Not a directory; set ROS_LOG_DIR to another '
+                            'folder'),
+], ids=['no home', 'home that is no folder'])
+def test_a_node_without_a_folder_for_its_log_says_how_to_name_one(ros_domain, folders, said):
+    environment = {name: value for name, value in os.environ.items()
+                   if name not in ('HOME', 'ROS_HOME', 'ROS_LOG_DIR')}
+    ended = subprocess.run([sys.executable, '-m', 'active_recon.nodes.recorder'], cwd=ROOT,
+                           env={**environment, **folders}, capture_output=True, text=True)
+    assert ended.returncode == 1
+    line, = ended.stderr.splitlines()
+    assert line.endswith(f"ROS's log: {said}")
 
 
 @pytest.mark.parametrize('given', [('-p', 'object_size:=0.5'), ('--nonsense',)])

@@ -1,7 +1,10 @@
 """`active-recon call`, `set` and `status` on real nodes."""
 
+import os
 from pathlib import Path
 import re
+import subprocess
+import sys
 import time
 
 from active_recon.launching.processes import private_environment
@@ -178,3 +181,14 @@ def test_the_status_leaves_hidden_nodes_out(told, shared_bench):
         assert '_watching' not in told(0, 'status', '--timeout', '3')
     finally:
         hidden.destroy_node()
+
+
+def test_a_command_needs_no_home_to_join_the_nodes(ros_domain):
+    joining = ('from active_recon.launching.loop_client import joined_domain\n'
+               'with joined_domain("_command"):\n'
+               '    pass')
+    environment = {name: value for name, value in os.environ.items()
+                   if name not in ('HOME', 'ROS_HOME', 'ROS_LOG_DIR')}
+    ended = subprocess.run([sys.executable, '-c', joining], env=environment, capture_output=True,
+                           text=True, cwd=Path(__file__).parents[2])
+    assert (ended.returncode, ended.stderr) == (0, '')

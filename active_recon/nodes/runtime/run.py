@@ -15,14 +15,16 @@ from active_recon.interrupts import stop_signals
 from active_recon.nodes.runtime.shared_memory import make_room
 from active_recon.nodes.runtime.usage import is_help_wanted, usage
 from active_recon.parameters.yaml_files import read_yaml
+from active_recon.whole_files import writable_folder
 import rclpy
 from rclpy.executors import Executor, SingleThreadedExecutor
-from rclpy.logging import get_logger
+from rclpy.logging import get_logger, get_logging_directory
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
 _CLOSE_TIMEOUT_S = 15.0
+_NO_LOG_FILE = '--disable-external-lib-logs'  # of ROS
 
 
 def run_node(make_node: Callable[[], Node], args: list[str] | None = None) -> None:
@@ -121,13 +123,34 @@ class StopRequests:
 
 
 def _init(args: list[str] | None) -> None:
-    """Parse the arguments; ConfigError where ROS cannot, as on a params file that is no YAML."""
-    for file in params_files(sys.argv[1:] if args is None else args):
+    """
+    Parse the arguments, and begin the log.
+
+    Raises ConfigError where ROS cannot, as on a params file that is no YAML, or for a user
+    without a home.
+    """
+    given = sys.argv[1:] if args is None else args
+    for file in params_files(given):
         read_yaml(file)
+    if _NO_LOG_FILE not in given:
+        _check_log_folder()
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:
         raise ConfigError(f'cannot start: {error}') from error
+
+
+def _check_log_folder() -> None:
+    """Raise ConfigError where ROS cannot write its log: its own errors name no remedy."""
+    try:
+        folder = get_logging_directory()
+    except RuntimeError as error:
+        raise ConfigError("ROS's log: no folder: expected HOME or ROS_LOG_DIR to name one, got "
+                          'neither') from error
+    try:
+        writable_folder(folder)
+    except ConfigError as error:
+        raise ConfigError(f"ROS's log: {error}; set ROS_LOG_DIR to another folder") from error
 
 
 def params_files(args: Sequence[str]) -> list[Path]:
