@@ -109,7 +109,9 @@ class NodeProcesses:
         for node, process in self._running.items():
             code = process.poll()
             if code is not None:
-                raise self.failure(node, f'ended with code {code}')
+                # The kernel tells in no other way that memory ran out, as in a container
+                cause = ' (killed: was there enough memory?)' if code == -signal.SIGKILL else ''
+                raise self.failure(node, f'ended with code {code}{cause}')
 
     def failure(self, node: str, what: str) -> NodeError:
         """Return the error that a node did `what`, with the last lines of its log."""

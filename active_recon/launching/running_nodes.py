@@ -11,7 +11,7 @@ from typing import Any
 from active_recon.errors import ConfigError
 from active_recon.launching.loop_client import joined_domain, LoopClient
 from active_recon.nodes.runtime.hidden_nodes import is_hidden
-from active_recon.nodes.runtime.qos import endpoint_node, SENSOR_QOS
+from active_recon.nodes.runtime.qos import endpoint_node, NOTHING_COMES, SENSOR_QOS
 from active_recon.parameters.declaration import nearest
 from active_recon.parameters.value_text import value_from_text
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -104,17 +104,23 @@ class RunningNodes(LoopClient):
                 {pair.key: pair.value for pair in each.values})) for each in msg.status)
             readings.update((name, each) for name, each in heard.items() if self._is_asked(name))
 
+        def publishers() -> set[str | None]:
+            return set(map(endpoint_node,
+                           self._node.get_publishers_info_by_topic('/diagnostics')))
+
         def silent() -> list[str]:
-            endpoints = self._node.get_publishers_info_by_topic('/diagnostics')
-            nodes = {name for name in map(endpoint_node, endpoints) if name is not None}
-            return sorted(name for name in nodes if not is_hidden(name) and self._is_asked(name)
-                          and not any(_tells_of(each, name) for each in heard))
+            return sorted(
+                name for name in publishers() if name and not is_hidden(name)
+                and self._is_asked(name) and not any(_tells_of(each, name) for each in heard))
 
         self._node.create_subscription(DiagnosticArray, '/diagnostics', take, SENSOR_QOS)
         discovered_at = time.monotonic() + _DISCOVERY_S
         self._appears(lambda: bool(readings) and not silent()
                       and time.monotonic() > discovered_at)
         if not readings and not silent():
+            if None in publishers():
+                raise ConfigError('no diagnostics: expected those of a running node, found a node '
+                                  f'of {NOTHING_COMES}')
             where = f' in the namespace /{self._namespace}' if self._namespace else ''
             raise self._missing(f'diagnostics{where}', 'a running node', sorted(heard))
         return [readings[name] for name in sorted(readings)], silent()

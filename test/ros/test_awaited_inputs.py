@@ -1,5 +1,8 @@
 """An input that has never had a message is warned of, with what could be heard instead."""
 
+from active_recon.nodes.runtime import awaited_inputs
+from active_recon.nodes.runtime.diagnostics import Diagnostics
+from geometry_msgs.msg import PoseStamped
 import pytest
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState
@@ -66,6 +69,18 @@ def test_a_publisher_that_is_silent_or_of_another_type_is_named_with_its_qos(
          '/bench publishes there (best effort, volatile) and has published nothing yet',
          '/bench publishes there (reliable, volatile) and publishes sensor_msgs/msg/Image instead '
          'of sensor_msgs/msg/CameraInfo')
+
+
+def test_a_publisher_whose_name_does_not_come_is_told_to_be_out_of_reach(
+        bench, said, monkeypatch):
+    # As with nodes of another user, or in a container with a /dev/shm of its own
+    monkeypatch.setattr(awaited_inputs, 'endpoint_node', lambda _endpoint: None)
+    bench.node.create_publisher(PoseStamped, 'camera/pose', STREAM_QOS)
+    inputs = awaited_inputs.AwaitedInputs(bench.node, Diagnostics(bench.node))
+    inputs.expect('camera/pose', {PoseStamped: ''})
+    problem = said('bench', 'camera/pose', 'a node publishes there (reliable, volatile) of which '
+                   'nothing gets here, not even its name: run all nodes of a machine as one user')
+    assert 'has published nothing yet' not in problem
 
 
 def test_the_first_message_takes_its_warning_back_for_good_also_where_it_is_refused(

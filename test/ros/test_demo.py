@@ -245,7 +245,7 @@ def test_a_node_that_dies_is_told_with_its_last_words(start_demo):
     os.kill(nodes['turntable_camera'], signal.SIGKILL)
     code, _, err = demo.end()
     assert code == 2
-    assert 'turntable_camera ended with code -9' in err
+    assert 'turntable_camera ended with code -9 (killed: was there enough memory?). The' in err
     assert '[turntable_camera]: ready' in err
     assert 'Traceback' not in err
     assert not demo.nodes()

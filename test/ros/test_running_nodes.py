@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 
+from active_recon.launching import running_nodes
 from active_recon.launching.processes import private_environment
 from command_line import command, refusal
 from diagnostic_msgs.msg import DiagnosticArray
@@ -113,6 +114,13 @@ def test_where_no_node_runs_the_domain_is_named(monkeypatch, capsys, arguments, 
     said = refusal(monkeypatch, capsys, *arguments, '--timeout', '0.5')
     assert f'no {missing}: expected ' in said
     assert f'found none within 0.5 s on ROS domain {environment["ROS_DOMAIN_ID"]}; start' in said
+
+
+def test_the_status_tells_of_a_node_that_is_out_of_reach(nodes, monkeypatch, capsys):
+    # As one of another user: it is discovered, and nothing else of it arrives
+    monkeypatch.setattr(running_nodes, 'endpoint_node', lambda _endpoint: None)
+    said = refusal(monkeypatch, capsys, 'status', '--namespace', 'elsewhere', '--timeout', '0.5')
+    assert 'found a node of which nothing gets here, not even its name: run all nodes' in said
 
 
 def warned_status(told):

@@ -123,7 +123,8 @@ def test_where_one_node_ends_the_others_are_stopped_and_the_command_fails(up, be
     os.kill(node_pids(tmp_path)[0], signal.SIGKILL)
     assert process.wait(BUDGET_S) == 2
     assert not node_pids(tmp_path)
-    assert 'ended with code -9' in (tmp_path / 'up.log').read_text()
+    said = (tmp_path / 'up.log').read_text()
+    assert 'ended with code -9 (killed: was there enough memory?)' in said
 
 
 def test_a_file_that_cannot_be_used_starts_nothing(up, tmp_path):

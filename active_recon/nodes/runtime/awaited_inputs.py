@@ -5,7 +5,7 @@ from difflib import SequenceMatcher
 from typing import Any
 
 from active_recon.nodes.runtime.diagnostics import Diagnostics
-from active_recon.nodes.runtime.qos import endpoint_node, profile_words
+from active_recon.nodes.runtime.qos import endpoint_node, NOTHING_COMES, profile_words
 from active_recon.nodes.runtime.resting_timer import RestingTimer
 from msg_tools.serialization import type_name
 from rclpy.node import Node
@@ -82,10 +82,13 @@ class AwaitedInputs:
     def _publishers(self, topic: str, suffixes: Mapping[str, str]) -> Iterator[str]:
         """Yield a description of each publisher of a topic."""
         for each in self._node.get_publishers_info_by_topic(topic):
-            what = ('has published nothing yet' if each.topic_type in suffixes
-                    else f'publishes {each.topic_type} instead of {" or ".join(suffixes)}')
-            yield (f'{endpoint_node(each) or "a node"} publishes there '
-                   f'({profile_words(each.qos_profile)}) and {what}')
+            name = endpoint_node(each)
+            if each.topic_type not in suffixes:
+                what = f'and publishes {each.topic_type} instead of {" or ".join(suffixes)}'
+            else:
+                what = 'and has published nothing yet' if name else f'of {NOTHING_COMES}'
+            profile = profile_words(each.qos_profile)
+            yield f'{name or "a node"} publishes there ({profile}) {what}'
 
     def _candidates(self, name: str,
                     suffixes: Mapping[str, str]) -> Iterator[tuple[str, str, str]]:

@@ -18,6 +18,14 @@ SENSOR_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
 HIGH_RATE_QOS = QoSProfile(depth=200, reliability=ReliabilityPolicy.BEST_EFFORT)
 """As `SENSOR_QOS`, with room for the poses that arrive while the network runs."""
 _UNKNOWN_NODE = '_NODE_NAME_UNKNOWN_'  # an endpoint may be discovered before its node's name
+NOTHING_COMES = ('which nothing gets here, not even its name: run all nodes of a machine as one '
+                 'user and with one /dev/shm, or all with FASTDDS_BUILTIN_TRANSPORTS=UDPv4')
+"""
+Of a node whose name stays unknown, after 'of'.
+
+Discovery goes by UDP, all else by the shared memory of what Fast DDS takes for one machine, which
+other users and containers cannot open.
+"""
 
 
 def endpoint_node(endpoint: TopicEndpointInfo) -> str | None:
