@@ -4,9 +4,21 @@ from pathlib import Path
 import resource
 from shutil import rmtree
 
+from active_recon.bags.storage.atomic_bag import atomic_bag
 from active_recon.errors import RecordingError
 import pytest
-from recorded_messages import announced, cdr, errors_in, header, image, small_disk, time_of
+from recorded_messages import (
+    announced,
+    cdr,
+    definition,
+    errors_in,
+    header,
+    IMAGE,
+    image,
+    SENSOR,
+    small_disk,
+    time_of,
+)
 from rosbags.highlevel import AnyReader
 
 
@@ -49,6 +61,17 @@ def test_a_disk_that_fills_while_the_bag_is_closed_is_told(tmp_path):
         bag.close()
     with AnyReader([bag.path]) as reader:
         assert reader.message_count == 0
+
+
+def test_a_bag_that_is_written_whole_or_not_at_all_tells_of_a_full_disk_by_its_own_name(tmp_path):
+    with (small_disk(10_000), pytest.raises(RecordingError) as refusal,
+          atomic_bag(tmp_path / 'run') as bag):
+        bag.add_topic('/camera/image_raw', IMAGE, definition(IMAGE), (SENSOR,))
+        bag.write('/camera/image_raw', cdr(image(0, 256)), time_of(0), 0)
+    assert str(refusal.value).startswith(f'cannot write a bag to {tmp_path / "run"}: ')
+    assert 'the bag ends after' not in str(refusal.value)
+    assert refusal.value.kind == 'disk_full'
+    assert not any(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize('end', ['flush', 'close'])

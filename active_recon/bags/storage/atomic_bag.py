@@ -30,6 +30,12 @@ def atomic_bag(folder: Path) -> Iterator[BagWriter]:
             with BagWriter(unfinished / folder.name) as bag:
                 yield bag
             bag.folder.rename(folder)
+    except RecordingError as error:
+        if not isinstance(error.__cause__, OSError):
+            raise
+        # It tells what of the bag is left, as of a recording: nothing is
+        raise RecordingError(f'cannot write a bag to {folder}: {error.__cause__.strerror}',
+                             error.kind) from error.__cause__
     except OSError as error:
         raise RecordingError(f'cannot write a bag to {folder}: {error}',
                              'bag_not_begun') from error
