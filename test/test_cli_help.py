@@ -4,6 +4,7 @@ import re
 
 from active_recon import __version__
 from active_recon.cli.main import app, flowing
+from command_line import command as run
 import pytest
 import typer
 from typer.testing import CliRunner
@@ -59,3 +60,8 @@ def test_a_paragraph_is_one_line_and_stays_apart_from_the_next():
         """
 
     assert flowing(command) == 'Do this, and that.\n\nExample: do this'
+
+
+def test_a_refusal_has_its_exit_code_where_nobody_can_hear_it(monkeypatch, tmp_path):
+    monkeypatch.setattr('sys.stderr', None)  # as with 2>&-
+    assert run(monkeypatch, 'bag', 'info', tmp_path / 'missing.mcap') == 2

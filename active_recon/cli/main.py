@@ -105,7 +105,7 @@ def main() -> None:
             sys.exit(130)
         if not isinstance(error, (ActiveReconError, OSError)):
             raise
-        sys.stderr.write(f'active-recon: {error}\n')
+        typer.echo(f'active-recon: {error}', err=True)
         sys.exit(2)
     finally:
         # All that was imported ends with the process: looking through it takes 0.2 s
