@@ -136,9 +136,9 @@ def open_photos(paths: Iterable[Path]) -> tuple[list[PhotoFile], list[str]]:
     left_out: list[str] = []
     known: dict[bytes, Path] = {}
     for path in paths:
-        twin = converted.get(path.with_suffix(''), path)
+        twin = converted.get(path.with_suffix(''))
         try:
-            if twin != path and path.suffix.lower() in HEIC_ENDINGS:
+            if twin is not None and path.suffix.lower() in HEIC_ENDINGS:
                 raise DataError(f'{path.name}: the same photo as {twin.name}')
             photos.append(open_photo(path, known))
         except DataError as error:
@@ -216,8 +216,8 @@ def read_photo(photo: PhotoFile, upright: bool = True) -> NDArray[np.uint8]:
     except DataError as error:
         raise DataError(f'{photo.name}: not readable: expected a whole image, got: '
                         f'{error}') from error
-    turns = {} if upright == (already != 1) else _TURNED if upright else _TURNED_BACK
-    if photo.orientation in turns:
+    turns = _TURNED if upright else _TURNED_BACK
+    if upright == (already == 1) and photo.orientation in turns:
         pixels = pixels.transpose(turns[photo.orientation])
     return np.asarray(pixels, np.uint8)
 

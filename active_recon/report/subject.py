@@ -78,9 +78,9 @@ class Subject:
         for view in self.views:
             grid = shown_grid(view)
             if grid is not None and view.occupied is not None:
-                chosen = view.occupied.occupied(0)
-                above = min(above, float(grid.occupancy.min(initial=1, where=chosen)))
-                below = max(below, float(grid.occupancy.max(initial=0, where=~chosen)))
+                chosen, occupancy = view.occupied.occupied(0), grid.occupancy
+                above = min(above, float(occupancy.min(initial=1, where=chosen)))
+                below = max(below, float(occupancy.max(initial=0, where=~chosen)))
         if below == 0 and above < 1:  # without probabilities: just below all that is occupied
             return float(np.nextafter(np.float32(above), np.float32(0)))
         return (above + below) / 2

@@ -13,7 +13,7 @@ class SparseVoxelGrid(VoxelGrid):
     """
 
     def __init__(self, grid: VoxelGrid) -> None:
-        cells = np.flatnonzero(grid.occupancy)
+        cells = np.flatnonzero(grid.occupied(0))
         for name, value in (('_side', len(grid.occupancy)), ('_cells', cells.astype(np.uint32)),
                             ('_values', grid.occupancy.ravel()[cells]), ('size', grid.size)):
             object.__setattr__(self, name, value)  # it is frozen, as every grid

@@ -137,13 +137,12 @@ def _cells(recorded: VoxelGrid, grid: VoxelGrid, above: float) -> tuple[bool, fl
 
     A cell that is not in the cloud was at most at the threshold.
     """
-    recorded = recorded.as_fine_as(grid)
-    if recorded.occupancy.shape != grid.occupancy.shape:
+    known = recorded.as_fine_as(grid).occupancy
+    if known.shape != grid.occupancy.shape:
         return False, np.inf
-    published = recorded.occupancy > 0
-    apart = np.where(published, np.abs(recorded.occupancy - grid.occupancy),
+    apart = np.where(known > 0, np.abs(known - grid.occupancy),
                      np.maximum(grid.occupancy - np.float32(above), 0))
-    return np.array_equal(recorded.occupancy, grid.above(above).occupancy), float(apart.max())
+    return np.array_equal(known, grid.above(above).occupancy), float(apart.max())
 
 
 def _quality(recorded: Quality, replayed: Quality) -> float:

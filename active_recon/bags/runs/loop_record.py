@@ -108,13 +108,16 @@ class LoopRecord:
 
     def _refine_empty_grids(self) -> None:
         """Give grids without occupied cells the resolution of the nearest other grid in time."""
-        recorded = self.parts['occupancy'], self.parts['probabilities']
-        filled = {stamp: grid for grids in recorded for stamp, grid in grids.items()
-                  if grid.occupancy.any()}
-        for grids in recorded if filled else ():
-            for stamp in [stamp for stamp, grid in grids.items() if not grid.occupancy.any()]:
-                nearest = min(filled, key=lambda other: abs(other - stamp))
-                grids[stamp] = grids[stamp].as_fine_as(filled[nearest])
+        filled, empty = {}, []
+        for grids in (self.parts['occupancy'], self.parts['probabilities']):
+            for stamp, grid in grids.items():
+                if grid.occupancy.any():
+                    filled[stamp] = grid
+                else:
+                    empty.append((grids, stamp))
+        for grids, stamp in empty if filled else ():
+            nearest = min(filled, key=lambda other: abs(other - stamp))
+            grids[stamp] = grids[stamp].as_fine_as(filled[nearest])
 
     def _compute_entropies(self) -> None:
         for stamp, grid in self.parts['probabilities'].items():
